@@ -39,7 +39,7 @@ fn write_scene(
         true => Target::Software,
         false => Target::Hardware,
     };
-    let offline = Offline::new(&plan.model, &layout, target)?;
+    let offline = Offline::new(&plan.model, &layout, target, arguments.lanes)?;
     write_kernels(folder, &plan, &offline, worlds)?;
     let mut sim = Simulation::new(plan.model.clone(), &options)?;
     let mut words = vec![0; sim.layout().bytes / 8];

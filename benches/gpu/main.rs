@@ -73,6 +73,9 @@ struct Arguments {
     /// Writes the kernels of the software driver, not those of hardware.
     #[arg(long)]
     software: bool,
+    /// Threads that share a world, where contacts can be.
+    #[arg(long, default_value_t = 8)]
+    lanes: usize,
     /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
     #[arg(long, hide = true)]
     build_in: Option<PathBuf>,

@@ -5,6 +5,7 @@ mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
+mod lanes;
 #[path = "../../sim-core/device/tests/device/layer.rs"]
 mod layer;
 mod lost;

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from .slots import Slots, last_uses
 from .tree import (
     Assign,
+    Barrier,
     Binary,
     Break,
     Call,
@@ -129,6 +130,9 @@ class Writer:
                 self.condition(mask, body)
             case For():
                 self.loop(part)
+            case Barrier():
+                # lanes run in lockstep
+                pass
             case _:
                 raise AssertionError(f"{part} stands alone")
 

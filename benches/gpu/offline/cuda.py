@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .tree import (
     Assign,
+    Barrier,
     Binary,
     Break,
     Call,
@@ -68,6 +69,8 @@ def block(body: tuple[Statement, ...], file: str, lines: list[str]) -> None:
                 lines.append(f'_Pragma("unroll 1") for ({head}) {{')
                 block(inner, file, lines)
                 lines.append(f'#line {end} "{file}"\n}}')
+            case Barrier():
+                lines.append("__syncwarp(peers);")
             case Break():
                 lines.append("break;")
             case Return():

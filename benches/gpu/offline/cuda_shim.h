@@ -83,6 +83,7 @@ template <class T>
 static T __shfl_sync(uint32_t peers, T value, unsigned from) {
     return warp::exchange(peers, value, from);
 }
+static void __syncwarp(uint32_t peers) { warp::exchange(peers, 0u, warp::lane); }
 template <class T>
 static T __shfl_xor_sync(uint32_t peers, T value, unsigned mask) {
     return warp::exchange(peers, value, warp::lane ^ mask);

@@ -15,12 +15,10 @@ from .constants import Card
 from .dump import Scene
 
 DESCRIBED: dict[str, set[str]] = {
-    "rows": {"e40109c6"},
+    "rows": {"d409fc48"},
     "begin": {"49c8b5d7"},
-    "check faults": {"720058d0", "aa24db57"},
-    "count left out": {"44c41105"},
-    "show": {"a639cdd0"},
-    "counters": {"cfbd9191"},
+    "check faults": {"0dabda1d"},
+    "show": {"447bc884"},
 }
 """Fingerprints of the sources that `ends` describes."""
 
@@ -68,7 +66,7 @@ def check(scene: Scene) -> None:
 
 def words(scene: Scene) -> int:
     """Values of 4 bytes that a world has in a frame: the counters are the last of them."""
-    places = [int(x) for x in re.findall(r"frame\[(\d+)u \+ world\]", scene.around["counters"])]
+    places = [int(x) for x in re.findall(r"frame\[(\d+)u \+ world\]", scene.around["show"])]
     return max(places) // scene.worlds + 1
 
 
@@ -77,21 +75,20 @@ def ends(scene: Scene, card: Card, worlds: int, tiles: int) -> Ends:
     check(scene)
     wait = card.l2_latency / card.clock
     columns, shown, moving = scene.facts["dofs"], words(scene), scene.facts["moving"]
-    # a row's sectors, one trip each since a store lies between; before them the head
-    trips = 2 + columns * 4 // 32
-    rows = c.BUS_LATENCY * trips + worlds * columns * 4 / card.bus_rate
+    # a copy over the bus, then a thread per word: the head, the word, its store, which moves a sector
+    sent = c.BUS_LATENCY + worlds * columns * 4 / card.bus_rate
+    rows = max(3 * wait, worlds * columns * (4 + 32) / card.l2_rate)
     # copies vector by vector, each after the one before: they lie in one buffer
     begin = wait * (moving // 4 + 3)
-    # bounds over the bus, once; state by vectors, then counters
-    faults = c.BUS_LATENCY + wait * (moving // 4 + 2)
-    left_out = 2 * wait
-    # word by word, each after the store before it: one of four comes from level 2; each store moves a sector of its own
-    show = max(shown * (wait + 3 * card.l1_latency / card.clock) / 4, worlds * shown * 32 / card.l2_rate)
+    # bounds; state by vectors, then counters
+    faults = wait * (moving // 4 + 3)
+    # a thread per word: two entries of the table, the word out of a vector that neighbours share, its store
+    show = max(4 * wait, worlds * shown * (8 + 4) / card.l2_rate)
     counters = c.COUNTERS / card.clock
-    around = 6
+    around = 4
     copies = worlds * shown * 4
     return Ends(
-        rows + tiles * (begin + faults + left_out + counters) + show + tiles * around * c.DISPATCH,
+        sent + rows + tiles * (begin + faults + counters) + show + tiles * (around + 1) * c.DISPATCH,
         c.DISPATCH + copies / card.bus_rate,
         c.HOST_SUBMIT + c.SUBMISSION + c.WAKE + worlds * (c.HOST_WORLD + columns * 4 / c.HOST_COPY_RATE),
         copies / c.HOST_COPY_RATE,

@@ -6,6 +6,7 @@ from .expressions import Reader
 from .tokens import Refused, tokens
 from .tree import (
     Assign,
+    Barrier,
     Binary,
     Binding,
     Break,
@@ -33,7 +34,14 @@ def parse(text: str, file: str) -> Kernel:
     reader = Reader(file, tokens(file, text))
     kernel = head(reader)
     reader.types = {"worlds": "u32"}
+    line = reader.next.line
+    if kernel.has_place:
+        reader.types["place"] = "u32"
     kernel.body = block(reader, kernel, depth=0)
+    if kernel.has_place:
+        # a workgroup is a warp here
+        place = Binary("%", Name("thread_x", "u32"), Number("32", "u32"), "u32")
+        kernel.body = (Define(line, "place", place, changes=False), *kernel.body)
     if reader.next.kind != "end":
         raise reader.refuse(f"a second function begins with `{reader.next.text}`")
     kernel.types = reader.types
@@ -55,7 +63,11 @@ def head(reader: Reader) -> Kernel:
             raise reader.refuse(f"unknown declaration `{reader.next.text}`")
     reader.skip("fn")
     reader.name()
-    reader.skip("(", "@", "builtin", "(", "global_invocation_id", ")", "thread", ":", "vec3<u32>", ")", "{")
+    reader.skip("(", "@", "builtin", "(", "global_invocation_id", ")", "thread", ":", "vec3<u32>")
+    if reader.takes(","):
+        reader.skip("@", "builtin", "(", "subgroup_invocation_id", ")", "place", ":", "u32")
+        kernel.has_place = True
+    reader.skip(")", "{")
     return kernel
 
 
@@ -102,7 +114,7 @@ def block(reader: Reader, kernel: Kernel, depth: int) -> tuple[Statement, ...]:
     return tuple(found)
 
 
-def statement(reader: Reader, kernel: Kernel, depth: int) -> Statement:
+def statement(reader: Reader, kernel: Kernel, depth: int) -> Statement:  # noqa: PLR0911 - a return per kind
     """Takes a statement; `depth` is the number of loops and conditions around it."""
     line = reader.next.line
     match reader.next.text:
@@ -122,6 +134,9 @@ def statement(reader: Reader, kernel: Kernel, depth: int) -> Statement:
             return If(line, mask, body, reader.words[reader.at - 1].line)
         case "for":
             return loop(reader, kernel, depth)
+        case "subgroupBarrier":
+            reader.skip("subgroupBarrier", "(", ")", ";")
+            return Barrier(line)
         case "break":
             reader.skip("break", ";")
             return Break(line)

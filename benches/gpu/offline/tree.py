@@ -136,6 +136,13 @@ class For:
 
 
 @dataclass(frozen=True, slots=True)
+class Barrier:
+    """`subgroupBarrier();`: what lanes wrote before it, those of their world read after it."""
+
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
 class Break:
     """`break;`"""
 
@@ -149,7 +156,7 @@ class Return:
     line: int
 
 
-Statement = Define | Assign | Store | If | For | Break | Return
+Statement = Define | Assign | Store | If | For | Barrier | Break | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,4 +179,6 @@ class Kernel:
     body: tuple[Statement, ...] = ()
     lanes: int = 1
     """Threads that share a world."""
+    has_place: bool = False
+    """Whether it asks for a thread's place in its subgroup."""
     types: dict[str, Type] = field(default_factory=dict)

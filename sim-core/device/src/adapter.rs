@@ -169,7 +169,9 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
         subgroup_min: info.subgroup_min_size,
         subgroup_max: info.subgroup_max_size,
         // on Vulkan it asks for SHUFFLE and SHUFFLE_RELATIVE in compute (VkPhysicalDeviceSubgroupProperties)
-        shuffles: adapter.features().contains(wgpu::Features::SUBGROUP),
+        shuffles: adapter
+            .features()
+            .contains(wgpu::Features::SUBGROUP | wgpu::Features::SUBGROUP_BARRIER),
         imports,
     }
 }

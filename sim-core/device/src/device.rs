@@ -64,7 +64,7 @@ impl Device {
         };
         let wanted = wgpu::DeviceDescriptor {
             required_features: match info.shuffles {
-                true => wgpu::Features::SUBGROUP,
+                true => wgpu::Features::SUBGROUP | wgpu::Features::SUBGROUP_BARRIER,
                 false => wgpu::Features::empty(),
             },
             required_limits: adapter.limits(),

@@ -32,10 +32,12 @@ pub(crate) fn read(source: &Source, spirv: bool, shuffles: bool) -> Result<Modul
     let wgsl = source.plain();
     let module = naga::front::wgsl::parse_str(&wgsl).map_err(|e| e.emit_to_string(&wgsl))?;
     let capabilities = match shuffles {
-        true => Capabilities::SUBGROUP,
+        true => Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER,
         false => Capabilities::empty(),
     };
-    let info = Validator::new(ValidationFlags::all(), capabilities)
+    // what threads do together, the branches around it must let them do: naga cannot know which threads share a world
+    let flags = ValidationFlags::all() - ValidationFlags::CONTROL_FLOW_UNIFORMITY;
+    let info = Validator::new(flags, capabilities)
         .validate(&module)
         .map_err(|e| e.emit_to_string(&wgsl))?;
     let stage = naga::ShaderStage::Compute;

@@ -52,6 +52,8 @@ pub struct Options {
     pub device: Device,
     /// Whether the batches of a GPU are recorded or encoded; benchmarks compare both.
     pub replay: Replay,
+    /// Threads of a GPU that share a world where contacts can be, a power of two up to 32; none = what suits the adapter.
+    pub world_threads: Option<usize>,
     /// Limit on the compile time of a GPU program; a driver that exceeds it is abandoned.
     pub compile_limit: Duration,
     /// Precision of state, commands and fields.
@@ -78,6 +80,7 @@ impl Default for Options {
             worlds: 1,
             device: Device::Cpu,
             replay: Replay::Recorded,
+            world_threads: None,
             compile_limit: COMPILE_LIMIT,
             precision: Precision::F32,
             threads: None,
@@ -141,6 +144,7 @@ pub(crate) fn backends(
             adapter,
             cache: cache.as_deref(),
             replay: options.replay,
+            world_threads: options.world_threads,
             compile_limit: options.compile_limit,
         };
         gpu::create(model, groups, layout, &wanted)

@@ -116,7 +116,7 @@ impl Live<'_> {
                             Bounds::Rows { list, .. } => {
                                 self.names.insert(*list);
                             }
-                            Bounds::Span { first, end } => {
+                            Bounds::Span { first, end } | Bounds::Shared { first, end } => {
                                 first.each_operand(|x| self.mark(x));
                                 end.each_operand(|x| self.mark(x));
                             }

@@ -116,6 +116,17 @@ impl Pair<'_> {
             (Op::Input(a), Op::Input(b)) => same(a == b),
             (Op::Get(a), Op::Get(b)) | (Op::Count(a), Op::Count(b)) => self.name(*a, *b),
             (Op::Load(a), Op::Load(b)) => self.cell(a, b),
+            (Op::LoadAt(a, x), Op::LoadAt(b, y)) => {
+                self.cell(a, b)?;
+                self.operand(*x, *y)
+            }
+            (Op::Lane, Op::Lane) => Ok(()),
+            (Op::Alike(a), Op::Alike(b)) => self.operand(*a, *b),
+            (Op::FromLane(a, m), Op::FromLane(b, n))
+            | (Op::AcrossLanes(a, m), Op::AcrossLanes(b, n)) => {
+                same(m == n)?;
+                self.operand(*a, *b)
+            }
             (Op::Unary(o, a), Op::Unary(p, b)) => {
                 same(o == p)?;
                 self.operand(*a, *b)

@@ -33,6 +33,7 @@ mod fold;
 mod handles;
 mod iterations;
 mod known_values;
+mod lanes;
 mod lists;
 mod loop_fusion;
 mod loops;

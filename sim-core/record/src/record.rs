@@ -46,6 +46,7 @@ pub fn record(
         names,
         values,
         scratch: 0,
+        lanes: state.lanes,
         body,
     };
     recording.scratch = recording.reach();

@@ -6,7 +6,7 @@ use super::handles::{
     RecordedMask, RecordedRow, RecordedVariable,
 };
 use super::state::{Kind, with};
-use super::tree::{Bounds, Cell, Op, Operand, Row, Statement};
+use super::tree::{Binary, Bounds, Cell, Op, Operand, Row, Statement};
 use sim_physics::lane::{Cx, Fixed, Table};
 use std::marker::PhantomData;
 use std::panic::Location;
@@ -21,6 +21,20 @@ impl Recorder {
         Recorder {
             thread: PhantomData,
         }
+    }
+
+    /// Has so many threads share the work of a world, a power of two up to 32. Call it before
+    /// code that asks for its lanes.
+    ///
+    /// # Panics
+    /// If it is another number.
+    #[track_caller]
+    pub fn set_lanes(&mut self, lanes: usize) {
+        assert!(
+            lanes.is_power_of_two() && lanes <= 32,
+            "lanes are added in pairs"
+        );
+        with(Location::caller(), |s| s.lanes = lanes);
     }
 }
 
@@ -69,6 +83,75 @@ impl Cx for Recorder {
                 s.assign(v.name, value);
             }
         });
+    }
+
+    #[track_caller]
+    fn lanes(&self) -> usize {
+        with(Location::caller(), |s| s.lanes)
+    }
+
+    #[track_caller]
+    fn own(&mut self, values: &[Recorded]) -> Recorded {
+        with(Location::caller(), |s| {
+            let lanes = s.lanes;
+            let zero = Operand::number(0.0);
+            let values: Vec<Operand> = values.iter().map(|x| s.see(*x)).collect();
+            let value = |lane: usize| values.get(lane).copied().unwrap_or(zero);
+            let mut own = value(0);
+            for lane in (1..lanes).filter(|&lane| value(lane) != value(lane - 1)) {
+                let number = s.value(Op::Lane);
+                let mask = s.value(Op::Binary(
+                    Binary::Lt,
+                    Operand::number(lane as f32 - 0.5),
+                    number,
+                ));
+                own = s.value(Op::Select(mask, value(lane), own));
+            }
+            s.handle(own)
+        })
+    }
+
+    #[track_caller]
+    fn of_lane(&mut self, x: Recorded, lane: usize) -> Recorded {
+        with(Location::caller(), |s| {
+            let x = s.see(x);
+            let value = match x {
+                Operand::Value(_) if s.lanes > 1 => s.value(Op::FromLane(x, lane)),
+                x => x,
+            };
+            s.handle(value)
+        })
+    }
+
+    #[track_caller]
+    fn sum_lanes(&mut self, x: Recorded) -> Recorded {
+        with(Location::caller(), |s| {
+            let x = s.see(x);
+            let sum = s.over_lanes(x, Binary::Add);
+            s.handle(sum)
+        })
+    }
+
+    #[track_caller]
+    fn max_lanes(&mut self, x: Recorded) -> Recorded {
+        with(Location::caller(), |s| {
+            let x = s.see(x);
+            let most = s.over_lanes(x, Binary::Max);
+            s.handle(most)
+        })
+    }
+
+    #[track_caller]
+    fn load_at(&mut self, t: Table, row: RecordedIndex, k: usize, column: Recorded) -> Recorded {
+        with(Location::caller(), |s| {
+            let column = s.see(column);
+            let value = match s.cell(t, row, k) {
+                // what a store may change is never shared
+                Some(cell) => s.fresh(Op::LoadAt(cell, column)),
+                None => Operand::number(0.0),
+            };
+            s.handle(value)
+        })
     }
 
     fn at(&self, i: usize) -> RecordedIndex {

@@ -13,6 +13,8 @@ pub struct Recording {
     pub(crate) names: usize,
     /// Scalars of scratch memory that the tables reach.
     pub(crate) scratch: usize,
+    /// Threads per world, a power of two.
+    pub(crate) lanes: usize,
     pub(crate) body: Vec<Statement>,
 }
 
@@ -65,6 +67,11 @@ impl Recording {
         self.outputs.len()
     }
 
+    /// Threads per world.
+    pub fn lanes(&self) -> usize {
+        self.lanes
+    }
+
     /// Scalars of scratch memory per world that the tables reach.
     pub fn scratch(&self) -> usize {
         self.scratch
@@ -82,7 +89,7 @@ impl Recording {
         self.each_statement(&mut |statement| match statement {
             Statement::Store { cell, .. } => reach(cell),
             Statement::Let(number) => {
-                if let Op::Load(cell) = &self.values[*number as usize] {
+                if let Op::Load(cell) | Op::LoadAt(cell, _) = &self.values[*number as usize] {
                     reach(cell);
                 }
             }
@@ -126,6 +133,7 @@ impl Recording {
         self.each_statement(&mut |statement| match statement {
             Statement::Let(number) => match self.values[*number as usize] {
                 Op::Load(_)
+                | Op::LoadAt(..)
                 | Op::Quad(_)
                 | Op::Constant(_)
                 | Op::Pick { .. }

@@ -6,7 +6,7 @@
 use super::error::{Misuse, Place, RecordError};
 use super::handles::{Counters, Home, NOWHERE, Owner, Recorded};
 use super::known_values::KnownValues;
-use super::tree::{Op, Operand, Statement};
+use super::tree::{Binary, Op, Operand, Statement};
 use sim_physics::lane::Table;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -55,6 +55,8 @@ pub(super) struct Value {
 
 pub(super) struct State {
     recording: u32,
+    /// Threads per world.
+    pub lanes: usize,
     pub values: Vec<Value>,
     names: u32,
     pub open: Vec<Scope>,
@@ -80,6 +82,7 @@ impl Session {
         static RECORDINGS: AtomicU32 = AtomicU32::new(1);
         let mut state = State {
             recording: RECORDINGS.fetch_add(1, Ordering::Relaxed),
+            lanes: 1,
             values: Vec::new(),
             names: 0,
             open: Vec::new(),
@@ -249,6 +252,18 @@ impl State {
             self.innermost_mut().values.insert(op, number);
         }
         value
+    }
+
+    /// An operation over the values of all lanes: of neighbours, then of pairs, and so on.
+    pub(super) fn over_lanes(&mut self, x: Operand, binary: Binary) -> Operand {
+        let mut x = x;
+        let mut apart = 1;
+        while apart < self.lanes {
+            let other = self.value(Op::AcrossLanes(x, apart));
+            x = self.value(Op::Binary(binary, x, other));
+            apart *= 2;
+        }
+        self.value(Op::Alike(x))
     }
 
     /// A new value, never shared.

@@ -59,6 +59,16 @@ pub(crate) enum Op {
     Load(Cell),
     /// Rows pushed to a list up to this point.
     Count(u32),
+    /// A scalar in scratch memory at this point, in a column behind the cell's: an integer.
+    LoadAt(Cell, Operand),
+    /// Number of this lane of the world.
+    Lane,
+    /// The value of a given lane.
+    FromLane(Operand, usize),
+    /// The value of the lane whose number differs in one bit.
+    AcrossLanes(Operand, usize),
+    /// A value that is the same in all lanes, of operations in which each had another.
+    Alike(Operand),
     Unary(Unary, Operand),
     Binary(Binary, Operand, Operand),
     /// `a * b + c`, rounded once.
@@ -92,8 +102,13 @@ impl Op {
     /// Calls `f` with every operand.
     pub(crate) fn each_operand(&self, mut f: impl FnMut(Operand)) {
         match *self {
-            Op::Input(_) | Op::Get(_) | Op::Count(_) => {}
+            Op::Input(_) | Op::Get(_) | Op::Count(_) | Op::Lane => {}
             Op::Load(cell) => cell.row.each_operand(f),
+            Op::LoadAt(cell, column) => {
+                cell.row.each_operand(&mut f);
+                f(column);
+            }
+            Op::FromLane(a, _) | Op::AcrossLanes(a, _) | Op::Alike(a) => f(a),
             Op::Quad(quad) => quad.row.each_operand(f),
             Op::Part(four, _) => f(Operand::Value(four)),
             Op::Number(row) => row.each_operand(f),
@@ -119,7 +134,7 @@ impl Op {
     pub(crate) fn is_inline(&self) -> bool {
         matches!(
             self,
-            Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_) | Op::Part(..)
+            Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_) | Op::Part(..) | Op::Alike(_)
         )
     }
 }
@@ -174,6 +189,8 @@ pub(crate) enum Bounds {
     Span { first: Row, end: Row },
     /// The rows that a list holds when the loop starts.
     Rows { list: u32, capacity: usize },
+    /// As `Span`, shared among the lanes of a world.
+    Shared { first: Row, end: Row },
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -21,6 +21,10 @@ pub(super) fn of_op(op: &Op, f: &mut impl FnMut(Use)) {
     match *op {
         Op::Get(name) | Op::Count(name) => f(Use::Read(name)),
         Op::Load(Cell { row, .. }) | Op::Quad(Quad { row, .. }) | Op::Number(row) => of_row(row, f),
+        Op::LoadAt(Cell { row, .. }, column) => {
+            of_row(row, f);
+            of_operand(column, f);
+        }
         Op::Constant(entry) | Op::Index { entry, .. } => of_row(entry.row, f),
         Op::After(row, x) => {
             of_row(row, f);
@@ -67,7 +71,7 @@ pub(super) fn of_statement(statement: &Statement, values: &[Op], f: &mut impl Fn
         }
         Statement::Loop { bounds, body, .. } => {
             match *bounds {
-                Bounds::Span { first, end } => {
+                Bounds::Span { first, end } | Bounds::Shared { first, end } => {
                     of_row(first, f);
                     of_row(end, f);
                 }
@@ -148,7 +152,11 @@ pub(crate) trait Rename {
 
     fn op(&mut self, op: Op) -> Op {
         match op {
-            Op::Input(_) | Op::Get(_) | Op::Count(_) => op,
+            Op::Input(_) | Op::Get(_) | Op::Count(_) | Op::Lane => op,
+            Op::LoadAt(cell, column) => Op::LoadAt(self.cell(cell), self.operand(column)),
+            Op::FromLane(a, lane) => Op::FromLane(self.operand(a), lane),
+            Op::AcrossLanes(a, apart) => Op::AcrossLanes(self.operand(a), apart),
+            Op::Alike(a) => Op::Alike(self.operand(a)),
             Op::Load(cell) => Op::Load(self.cell(cell)),
             Op::Unary(unary, a) => Op::Unary(unary, self.operand(a)),
             Op::Binary(binary, a, b) => Op::Binary(binary, self.operand(a), self.operand(b)),

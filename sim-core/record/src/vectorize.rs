@@ -22,6 +22,7 @@ impl Recording {
             values,
             names: self.names,
             scratch: self.scratch,
+            lanes: self.lanes,
             body,
         }
     }
@@ -87,6 +88,13 @@ impl Reach {
     fn of_cell(cell: &Cell) -> Reach {
         let Cell { table, row, number } = cell;
         Reach::new(*row, table.stride, table.base + number, table.rows, 1)
+    }
+
+    /// Of a cell and all columns behind it.
+    fn of_columns(cell: &Cell) -> Reach {
+        let Cell { table, row, number } = cell;
+        let span = table.stride - number;
+        Reach::new(*row, table.stride, table.base + number, table.rows, span)
     }
 
     /// Whether the two may share a scalar.
@@ -188,6 +196,11 @@ impl Vectorizer {
         match statement {
             Statement::Let(number) => match self.values[*number as usize] {
                 Op::Load(cell) => self.load(*number, cell, block),
+                Op::LoadAt(cell, _) => {
+                    let reach = Reach::of_columns(&cell);
+                    self.write(block, |r| r.meets(&reach));
+                    block.body.push(statement.clone());
+                }
                 _ => block.body.push(statement.clone()),
             },
             Statement::Store { cell, value } => self.store(cell, *value, block),
@@ -254,11 +267,11 @@ impl Vectorizer {
         };
         for statement in body {
             match statement {
-                Statement::Let(number) => {
-                    if let Op::Load(cell) = &self.values[*number as usize] {
-                        found.loads.push(reach(cell));
-                    }
-                }
+                Statement::Let(number) => match &self.values[*number as usize] {
+                    Op::Load(cell) => found.loads.push(reach(cell)),
+                    Op::LoadAt(cell, _) => found.loads.push(Reach::of_columns(cell)),
+                    _ => {}
+                },
                 Statement::Store { cell, .. } => found.stores.push(reach(cell)),
                 Statement::When { body, .. }
                 | Statement::Push { body, .. }

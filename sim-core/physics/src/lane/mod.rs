@@ -319,6 +319,38 @@ pub trait Cx: Sized {
         }
     }
 
+    /// Threads that share the work of a world, a power of two: its *lanes*. They all run the same code, and a value is the same in
+    /// all of them unless it comes from [`Cx::own`]. Where there is one, the methods for several are never called.
+    #[inline(always)]
+    fn lanes(&self) -> usize {
+        1
+    }
+    /// Another value in each lane of a world; 0 where there is none.
+    #[inline(always)]
+    fn own(&mut self, _values: &[Self::F]) -> Self::F {
+        unreachable!("a world has one lane")
+    }
+    /// The value that a lane of the world has.
+    #[inline(always)]
+    fn of_lane(&mut self, _x: Self::F, _lane: usize) -> Self::F {
+        unreachable!("a world has one lane")
+    }
+    /// The sum over all lanes of the world, in a fixed order.
+    #[inline(always)]
+    fn sum_lanes(&mut self, _x: Self::F) -> Self::F {
+        unreachable!("a world has one lane")
+    }
+    /// The largest of all lanes of the world.
+    #[inline(always)]
+    fn max_lanes(&mut self, _x: Self::F) -> Self::F {
+        unreachable!("a world has one lane")
+    }
+    /// Reads scalar `k + column` of a row; `column` is whole, and may differ between the lanes of a world.
+    #[inline(always)]
+    fn load_at(&mut self, _t: Table, _row: Self::I, _k: usize, _column: Self::F) -> Self::F {
+        unreachable!("a world has one lane")
+    }
+
     /// A constant index.
     fn at(&self, i: usize) -> Self::I;
     /// An index as a scalar.

@@ -1,71 +1,127 @@
-//! Compile time of statements: the unit is a simple statement.
-//!
-//! Measured on the software driver (llvmpipe of Mesa 22.3), which compiles every memory access to a loop over the lanes: a unit is
-//! 0.05 to 0.1 ms of a core, and eighty accesses in a kernel cost twice as much as alone.
+//! Cost of statements, as a driver's compiler has it: [`Prices`] of kinds of statements, which [`Cost`] counts.
 
 use crate::recording::Recording;
 use crate::tree::{Op, Statement};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul};
 
-/// Cost of some statements.
+/// What kinds of statements cost. The unit is a simple statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Prices {
+    /// A quarter of a vector that is read.
+    read: usize,
+    /// A scalar that is read by itself.
+    read_alone: usize,
+    /// A quarter of a vector that is written.
+    written: usize,
+    /// A scalar that is written by itself.
+    written_alone: usize,
+    /// A loop, without its statements.
+    loops: usize,
+    /// A kernel, without its statements.
+    kernel: usize,
+    /// Accesses at which the cost per access has doubled, if it grows. Then loops cost as their cube, too: one of them little,
+    /// twenty half a second.
+    many: Option<usize>,
+}
+
+impl Prices {
+    /// Compile time of Mesa's software driver (llvmpipe 22.3): it compiles every access to memory to a loop over the lanes. A unit
+    /// is 0.05 to 0.1 ms of a core, and eighty accesses in a kernel cost twice as much as alone.
+    pub const SOFTWARE: Prices = Prices {
+        read: 4,
+        read_alone: 12,
+        written: 3,
+        written_alone: 10,
+        loops: 100,
+        kernel: 80,
+        many: Some(1300),
+    };
+    /// Instructions of a hardware GPU, as NVIDIA's compiler writes them for sm_90: linear in the statements.
+    pub const HARDWARE: Prices = Prices {
+        read: 1,
+        read_alone: 2,
+        written: 1,
+        written_alone: 2,
+        loops: 6,
+        kernel: 20,
+        many: None,
+    };
+}
+
+/// Statements of some kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Cost {
-    pub work: usize,
-    /// Accesses to memory; their cost grows with the square.
-    pub access: usize,
-    /// Loops, which cost as their cube: one of them little, twenty half a second.
-    pub loops: usize,
-}
-
-/// A vector of four that is read.
-pub(super) const QUAD: Cost = access(16);
-/// A scalar that is read by itself.
-const NUMBER: Cost = access(12);
-/// A vector that is written.
-pub(super) const WRITTEN_QUAD: Cost = access(12);
-/// A scalar that is written by itself.
-const WRITTEN_NUMBER: Cost = access(10);
-/// A loop, without its statements.
-const LOOP: Cost = Cost {
-    work: 100,
-    access: 0,
-    loops: 1,
-};
-/// A kernel, without its statements.
-pub(super) const KERNEL: usize = 80;
-/// Accesses at which the cost per access has doubled.
-const MANY: usize = 1300;
-
-const fn work(work: usize) -> Cost {
-    Cost {
-        work,
-        access: 0,
-        loops: 0,
-    }
-}
-
-const fn access(access: usize) -> Cost {
-    Cost {
-        work: 0,
-        access,
-        loops: 0,
-    }
+    work: usize,
+    /// Quarters of vectors.
+    read: usize,
+    read_alone: usize,
+    written: usize,
+    written_alone: usize,
+    loops: usize,
 }
 
 impl Cost {
-    /// In one kernel, without the kernel's own.
-    pub(super) fn total(self) -> usize {
-        self.work + self.access + self.access * self.access / MANY + self.loops.pow(3)
+    const NONE: Cost = Cost {
+        work: 0,
+        read: 0,
+        read_alone: 0,
+        written: 0,
+        written_alone: 0,
+        loops: 0,
+    };
+    /// A vector of four that is read.
+    const QUAD: Cost = Cost::read(4);
+    /// A vector that is written.
+    pub const WRITTEN_QUAD: Cost = Cost::written(4);
+    const NUMBER: Cost = Cost {
+        read_alone: 1,
+        ..Cost::NONE
+    };
+    const WRITTEN_NUMBER: Cost = Cost {
+        written_alone: 1,
+        ..Cost::NONE
+    };
+    const LOOP: Cost = Cost {
+        loops: 1,
+        ..Cost::NONE
+    };
+
+    const fn work(work: usize) -> Cost {
+        Cost { work, ..Cost::NONE }
     }
 
-    /// Cost of scalars that share vectors, on average.
-    pub(super) fn of_numbers(self, numbers: usize) -> Cost {
+    /// Scalars that are read and share vectors.
+    pub const fn read(numbers: usize) -> Cost {
         Cost {
-            work: self.work * numbers / 4,
-            access: self.access * numbers / 4,
-            loops: self.loops,
+            read: numbers,
+            ..Cost::NONE
         }
+    }
+
+    /// Scalars that are written and share vectors.
+    pub const fn written(numbers: usize) -> Cost {
+        Cost {
+            written: numbers,
+            ..Cost::NONE
+        }
+    }
+
+    /// In one kernel, with the kernel's own.
+    pub fn of_kernel(self, prices: &Prices) -> usize {
+        prices.kernel + self.total(prices)
+    }
+
+    /// In one kernel, without the kernel's own.
+    pub fn total(self, prices: &Prices) -> usize {
+        let access = self.read * prices.read
+            + self.read_alone * prices.read_alone
+            + self.written * prices.written
+            + self.written_alone * prices.written_alone;
+        let growth = prices
+            .many
+            .map_or(0, |many| access * access / many + self.loops.pow(3));
+        self.work + self.loops * prices.loops + access + growth
     }
 }
 
@@ -74,7 +130,10 @@ impl Add for Cost {
     fn add(self, other: Cost) -> Cost {
         Cost {
             work: self.work + other.work,
-            access: self.access + other.access,
+            read: self.read + other.read,
+            read_alone: self.read_alone + other.read_alone,
+            written: self.written + other.written,
+            written_alone: self.written_alone + other.written_alone,
             loops: self.loops + other.loops,
         }
     }
@@ -91,7 +150,10 @@ impl Mul<usize> for Cost {
     fn mul(self, times: usize) -> Cost {
         Cost {
             work: self.work * times,
-            access: self.access * times,
+            read: self.read * times,
+            read_alone: self.read_alone * times,
+            written: self.written * times,
+            written_alone: self.written_alone * times,
             loops: self.loops * times,
         }
     }
@@ -104,11 +166,11 @@ impl Sum for Cost {
 }
 
 /// Cost of a vectorized kernel, with its inputs and outputs.
-pub(super) fn of_kernel(packed: &Recording) -> usize {
-    let fields = QUAD.of_numbers(packed.live_inputs().len());
-    let outputs = WRITTEN_QUAD.of_numbers(packed.outputs());
+pub(super) fn of_kernel(packed: &Recording, prices: &Prices) -> usize {
+    let fields = Cost::read(packed.live_inputs().len());
+    let outputs = Cost::written(packed.outputs());
     let body = of_vectorized(&packed.body, &packed.values);
-    KERNEL + (fields + outputs + body).total()
+    (fields + outputs + body).of_kernel(prices)
 }
 
 /// Cost of vectorized statements.
@@ -116,25 +178,27 @@ pub(super) fn of_vectorized(body: &[Statement], values: &[Op]) -> Cost {
     let cost = |statement: &Statement| match statement {
         Statement::Let(number) => of_op(&values[*number as usize]),
         Statement::StoreQuad { numbers, .. } => match numbers.iter().flatten().count() {
-            4 => WRITTEN_QUAD,
-            given => WRITTEN_NUMBER * given,
+            4 => Cost::WRITTEN_QUAD,
+            given => Cost::WRITTEN_NUMBER * given,
         },
-        Statement::Store { .. } => WRITTEN_NUMBER,
+        Statement::Store { .. } => Cost::WRITTEN_NUMBER,
         Statement::When { body, .. } | Statement::Push { body, .. } => {
-            work(20) + of_vectorized(body, values)
+            Cost::work(20) + of_vectorized(body, values)
         }
-        Statement::Loop { body, .. } => LOOP + of_vectorized(body, values),
-        _ => work(2),
+        Statement::Loop { body, .. } => Cost::LOOP + of_vectorized(body, values),
+        _ => Cost::work(2),
     };
     body.iter().map(cost).sum()
 }
 
 fn of_op(op: &Op) -> Cost {
     match op {
-        Op::Quad(_) => QUAD,
-        Op::Load(_) | Op::Constant(_) | Op::Pick { .. } | Op::Index { .. } => NUMBER,
-        op if op.is_inline() => Cost::default(),
-        _ => work(1),
+        Op::Quad(_) => Cost::QUAD,
+        Op::Load(_) | Op::LoadAt(..) | Op::Constant(_) | Op::Pick { .. } | Op::Index { .. } => {
+            Cost::NUMBER
+        }
+        op if op.is_inline() => Cost::NONE,
+        _ => Cost::work(1),
     }
 }
 
@@ -142,10 +206,10 @@ fn of_op(op: &Op) -> Cost {
 pub(super) fn of_simple(statement: &Statement, values: &[Op]) -> Cost {
     match statement {
         Statement::Let(number) => match &values[*number as usize] {
-            Op::Load(_) => QUAD.of_numbers(1),
+            Op::Load(_) => Cost::read(1),
             op => of_op(op),
         },
-        Statement::Store { .. } => WRITTEN_QUAD.of_numbers(1),
-        _ => work(1),
+        Statement::Store { .. } => Cost::written(1),
+        _ => Cost::work(1),
     }
 }

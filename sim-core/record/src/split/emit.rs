@@ -3,6 +3,7 @@
 use super::items::{Item, Pieces, uses_of};
 use super::kernel::Kernel;
 use super::plan::Plan;
+use crate::lanes;
 use crate::recording::Recording;
 use crate::tree::{Binary, Op, Operand, Row, Statement, Unary};
 use crate::uses::{Rename, Use, computed};
@@ -277,12 +278,18 @@ fn kernel(plan: &Plan<'_>, p: usize, options: &ProgramOptions) -> Kernel {
         values: writer.values,
         names: plan.recording.names,
         scratch: 0,
+        lanes: 1,
         body: writer.body,
     };
-    let recording = Recording {
+    let mut recording = Recording {
         scratch: recording.reach(),
         ..recording
     };
+    let values = &plan.recording.values;
+    if plan.recording.lanes > 1 && piece.items.iter().any(|item| item.needs_lanes(values)) {
+        recording.lanes = plan.recording.lanes;
+        lanes::share(&mut recording);
+    }
     let unless = piece
         .regions
         .iter()

@@ -2,6 +2,7 @@
 
 use super::cost::{self, Cost};
 use super::order::Part;
+use crate::lanes;
 use crate::tree::{Op, Operand, Row, Statement, Unary};
 use crate::uses::{Use, of_op, of_statement};
 use crate::vectorize;
@@ -28,6 +29,16 @@ pub(super) enum Item {
     Leave(usize, Operand),
     /// Counts a region's index.
     Next(usize),
+}
+
+impl Item {
+    /// Whether lanes of a world share its work.
+    pub fn needs_lanes(&self, values: &[Op]) -> bool {
+        match self {
+            Item::Run(statement) => lanes::needs_lanes(statement, values),
+            _ => false,
+        }
+    }
 }
 
 /// Statements between two cuts.

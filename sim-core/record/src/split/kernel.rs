@@ -1,6 +1,6 @@
 //! A kernel: a part of a recording that reads and writes fields.
 
-use super::cost;
+use super::cost::{self, Prices};
 use crate::recording::Recording;
 use crate::wgsl::{ProgramOptions, wgsl};
 use sim_physics::lane::Tables;
@@ -28,9 +28,9 @@ impl Kernel {
         &self.options
     }
 
-    /// How long a driver will take to compile it, in units of a simple statement.
-    pub fn cost(&self) -> usize {
-        cost::of_kernel(&self.recording.vectorized())
+    /// What it costs, in units of a simple statement.
+    pub fn cost(&self, prices: &Prices) -> usize {
+        cost::of_kernel(&self.recording.vectorized(), prices)
     }
 
     pub(super) fn run(&self, fields: &mut [f32], scratch: &mut [f32], tables: &Tables<f32>) {

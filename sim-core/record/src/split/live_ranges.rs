@@ -1,7 +1,9 @@
 //! Live ranges of values and variables, and the cheapest cuts between statements for them.
 
-use super::cost::{self, Cost};
+use super::cost::Cost;
 use super::items::{Item, Piece, bases, cost_of, uses_of};
+use super::order::Limits;
+use crate::lanes;
 use crate::recording::Recording;
 use crate::tree::{Operand, Statement};
 use crate::uses::{Use, computed};
@@ -18,6 +20,8 @@ pub(super) struct LiveRanges<'a> {
     last: Vec<usize>,
     /// The items that name a variable or a list, in order.
     named: Vec<Vec<Named>>,
+    /// Items behind which there is no cut: a value that differs between the lanes of a world is still used.
+    is_joined: Vec<bool>,
 }
 
 /// An item names a variable or a list.
@@ -32,6 +36,8 @@ struct Named {
 /// What the choice of cuts needs of an item.
 struct ItemSummary {
     cost: Cost,
+    /// Do the lanes of a world share its work?
+    is_wide: bool,
     /// Values that it uses, and those that it computes for later ones.
     uses: Vec<u32>,
     lasting: Vec<u32>,
@@ -76,6 +82,7 @@ impl<'a> LiveRanges<'a> {
             made: vec![0; values.len()],
             last: vec![0; values.len()],
             named: vec![Vec::new(); recording.names],
+            is_joined: Vec::new(),
         };
         let mut at = 1;
         for run in runs {
@@ -104,6 +111,20 @@ impl<'a> LiveRanges<'a> {
                 bases(*number, values, &mut |base| last[base as usize] = NEVER);
             }
         }
+        ranges.is_joined = vec![false; at];
+        let (varying, names) = lanes::varying(recording);
+        for name in names {
+            let named = &ranges.named[name as usize];
+            if let (Some(first), Some(last)) = (named.first(), named.last()) {
+                ranges.is_joined[first.at..last.at].fill(true);
+            }
+        }
+        for (x, varies) in varying.into_iter().enumerate() {
+            if varies && ranges.last[x] != NEVER {
+                let lived = ranges.made[x]..ranges.last[x].max(ranges.made[x]);
+                ranges.is_joined[lived].fill(true);
+            }
+        }
         ranges
     }
 
@@ -121,7 +142,7 @@ impl<'a> LiveRanges<'a> {
         let values = &self.recording.values;
         let (mut uses, mut lasting) = (Vec::new(), Vec::new());
         // entering or leaving a region writes a scalar
-        let mut cost = cost::WRITTEN_QUAD;
+        let mut cost = Cost::WRITTEN_QUAD;
         if let Item::Run(statement) = item {
             cost = cost_of(statement, values);
             computed(std::slice::from_ref(statement), &mut |x| {
@@ -139,14 +160,16 @@ impl<'a> LiveRanges<'a> {
         uses.dedup();
         ItemSummary {
             cost,
+            is_wide: self.recording.lanes > 1 && item.needs_lanes(values),
             uses,
             lasting,
             names: names_of(item, at, self.recording),
         }
     }
 
-    /// The cheapest cuts of a run into pieces of at most `most`, each of which costs `price` beside its statements.
-    pub(super) fn partition(&self, run: usize, most: usize, price: usize) -> Vec<Range<usize>> {
+    /// The cheapest cuts of a run into pieces within limits, each of which costs `price` beside its statements.
+    pub(super) fn partition(&self, run: usize, limits: &Limits, price: usize) -> Vec<Range<usize>> {
+        let (most, prices) = (limits.kernel, &limits.prices);
         let (first, run) = (self.first[run], &self.runs[run]);
         let n = run.items.len();
         if n == 0 {
@@ -162,10 +185,16 @@ impl<'a> LiveRanges<'a> {
         let mut met = vec![(NEVER, false, false); self.recording.names];
         for i in 0..n {
             let mut body = Cost::default();
+            // what every lane of a world computes again, if any work is shared
+            let (mut alike, mut is_wide) = (Cost::default(), false);
             let (mut reads, mut lasting, mut kept) = (0, 0, 0);
             for (j, item) in summaries.iter().enumerate().skip(i) {
                 let at = first + j;
                 body += item.cost;
+                is_wide |= item.is_wide;
+                if !item.is_wide {
+                    alike += item.cost;
+                }
                 for x in &item.uses {
                     let x = *x as usize;
                     if self.made[x] < first + i {
@@ -187,18 +216,24 @@ impl<'a> LiveRanges<'a> {
                     met.2 = met.1 && self.is_used_after(*name, at, run);
                     kept += usize::from(met.2);
                 }
-                let given = body + cost::QUAD.of_numbers(reads);
-                let left = cost::WRITTEN_QUAD.of_numbers(lasting + kept);
-                if cost::KERNEL + given.total() > most && j > i {
+                let given = body + Cost::read(reads);
+                let left = Cost::written(lasting + kept);
+                if given.of_kernel(prices) > most && j > i && !self.is_joined[at - 1] {
                     break;
                 }
-                let size = cost::KERNEL + (given + left).total();
-                let cost = cheapest[i].0.saturating_add(size + price);
-                if (size <= most || j == i) && cost < cheapest[j + 1].0 {
+                let size = (given + left).of_kernel(prices);
+                let again = if is_wide { alike.total(prices) } else { 0 };
+                let cost = cheapest[i].0.saturating_add(size + again + price);
+                let fits = size <= most || j == i || self.is_joined[at - 1];
+                if fits && !self.is_joined[at] && cost < cheapest[j + 1].0 {
                     cheapest[j + 1] = (cost, i);
                 }
             }
         }
+        assert!(
+            cheapest[n].0 < usize::MAX,
+            "values of lanes stay inside a run"
+        );
         let mut ranges = Vec::new();
         let mut end = n;
         while end > 0 {

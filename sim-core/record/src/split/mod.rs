@@ -16,6 +16,7 @@ mod plan;
 mod private;
 mod stops_last;
 
+pub use cost::Prices;
 pub use kernel::Kernel;
 pub use order::{Limits, Part};
 

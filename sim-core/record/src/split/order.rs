@@ -1,5 +1,7 @@
 //! What is dispatched, in which order, and how large kernels may be.
 
+use super::cost::Prices;
+
 /// How much kernels may cost, in units of a simple statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -9,7 +11,11 @@ pub struct Limits {
     /// that are still in the loop.
     pub repeated: usize,
     /// Cost of one more kernel inside such a loop, since it is dispatched once per iteration.
+    pub repeated_dispatch: usize,
+    /// Cost of one more kernel elsewhere.
     pub dispatch: usize,
+    /// Cost of statements.
+    pub prices: Prices,
 }
 
 /// A dispatch, or a repetition of dispatches.

@@ -32,8 +32,11 @@ pub(super) fn pieces(recording: &Recording, limits: Limits, spare: u32) -> Piece
             .regions
             .iter()
             .any(|region| regions[*region].iterations > 1);
-        let price = if repeats { limits.dispatch } else { 0 };
-        for range in ranges.partition(k, limits.kernel, price) {
+        let price = match repeats {
+            true => limits.repeated_dispatch,
+            false => limits.dispatch,
+        };
+        for range in ranges.partition(k, &limits, price) {
             pieces.push(Piece {
                 items: run.items[range].to_vec(),
                 regions: run.regions.clone(),
@@ -153,6 +156,6 @@ impl Cutter<'_> {
             1 => self.limits.kernel,
             _ => self.limits.repeated,
         };
-        cost_of(statement, &self.recording.values).total() > most
+        cost_of(statement, &self.recording.values).total(&self.limits.prices) > most
     }
 }

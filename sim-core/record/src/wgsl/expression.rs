@@ -26,6 +26,10 @@ impl Expressions<'_> {
             Op::Part(four, _) if self.single.contains_key(&four) => format!("t{four}"),
             Op::Part(four, k) => format!("t{four}.{}", COMPONENTS[k]),
             Op::Count(list) => format!("f32(n{list})"),
+            Op::LoadAt(cell, column) => scratch_at(&cell, &x(column)),
+            Op::Lane => "f32(lane)".to_owned(),
+            Op::Alike(a) => x(a),
+            Op::FromLane(..) | Op::AcrossLanes(..) => unreachable!("a statement of its own"),
             Op::Unary(unary, a) => match unary {
                 Unary::Neg => format!("(-{})", x(a)),
                 Unary::Not => format!("(!{})", x(a)),
@@ -98,6 +102,14 @@ fn place(first: usize, stride: usize, row: Row) -> String {
 pub(super) fn scratch(cell: &Cell) -> String {
     let Cell { table, row, number } = cell;
     let place = place(table.base + number, table.stride, *row);
+    format!("scratch[({place}) / 4u * worlds + world][({place}) % 4u]")
+}
+
+/// A scalar in a column that is found at run time.
+fn scratch_at(cell: &Cell, column: &str) -> String {
+    let Cell { table, row, number } = cell;
+    let place = place(table.base + number, table.stride, *row);
+    let place = format!("{place} + u32({column})");
     format!("scratch[({place}) / 4u * worlds + world][({place}) % 4u]")
 }
 

@@ -1,4 +1,4 @@
-//! Prints a recording as a WGSL compute shader: one world per thread, one `let` per value.
+//! Prints a recording as a WGSL compute shader: one thread per lane of a world, one `let` per value.
 //!
 //! Memory is a structure of arrays with the world innermost, so that neighbouring threads touch
 //! neighbouring scalars. The number of worlds and the size of a workgroup are constants of the
@@ -29,6 +29,16 @@ use expression::{COMPONENTS, Expressions, index, scratch, vector};
 use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 
+/// How the lanes of a world exchange values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Exchange {
+    /// Shuffles of a subgroup. Its size must be a multiple of the lanes.
+    #[default]
+    Subgroup,
+    /// Memory of a workgroup, which must be one world. For drivers without shuffles.
+    Workgroup,
+}
+
 /// Name of a program, and the fields of its inputs and outputs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProgramOptions {
@@ -45,6 +55,8 @@ pub struct ProgramOptions {
     pub unless: Vec<u32>,
     /// Whether a thread takes its world from a list. Binding 4 holds workgroups, 1, 1 and the number of worlds, binding 5 the list.
     pub is_listed: bool,
+    /// How lanes exchange values, if a world has several.
+    pub exchange: Exchange,
 }
 
 impl ProgramOptions {
@@ -81,6 +93,7 @@ impl Default for ProgramOptions {
             outputs: None,
             unless: Vec::new(),
             is_listed: false,
+            exchange: Exchange::default(),
         }
     }
 }
@@ -100,6 +113,8 @@ pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
         },
         text: String::new(),
         indent: 1,
+        exchange: options.exchange,
+        is_shared: false,
     };
     printer
         .program(options, &inputs, &outputs)
@@ -112,6 +127,9 @@ struct Printer<'a> {
     expressions: Expressions<'a>,
     text: String,
     indent: usize,
+    exchange: Exchange,
+    /// Inside a loop whose iterations are shared among lanes.
+    is_shared: bool,
 }
 
 /// Writes one line, indented.
@@ -132,11 +150,17 @@ impl Printer<'_> {
         outputs: &[u32],
     ) -> fmt::Result {
         writeln!(self.text, "override worlds: u32;")?;
-        writeln!(
-            self.text,
-            "override workgroup: u32 = {}u;",
-            options.workgroup
-        )?;
+        // a workgroup that is a world has as many threads; then no override may have the name of its memory
+        let lanes = self.recording.lanes();
+        let is_world = lanes > 1 && self.exchange == Exchange::Workgroup;
+        let threads = match is_world {
+            true => format!("{lanes}u"),
+            false => {
+                let threads = options.workgroup;
+                writeln!(self.text, "override workgroup: u32 = {threads}u;")?;
+                "workgroup".to_owned()
+            }
+        };
         writeln!(
             self.text,
             "@group(0) @binding(0) var<storage, read_write> fields: array<vec4<f32>>;"
@@ -167,18 +191,36 @@ impl Printer<'_> {
                  @group(0) @binding(5) var<storage, read> list: array<u32>;"
             )?;
         }
-        writeln!(self.text, "\n@compute @workgroup_size(workgroup)")?;
+        if is_world {
+            writeln!(self.text, "var<workgroup> exchange: array<f32, {lanes}>;")?;
+        }
+        writeln!(self.text, "\n@compute @workgroup_size({threads})")?;
+        let shuffles = lanes > 1 && self.exchange == Exchange::Subgroup;
+        let more = match shuffles {
+            true => ", @builtin(subgroup_invocation_id) place: u32",
+            false => "",
+        };
         writeln!(
             self.text,
-            "fn {}(@builtin(global_invocation_id) thread: vec3<u32>) {{",
+            "fn {}(@builtin(global_invocation_id) thread: vec3<u32>{more}) {{",
             options.entry
         )?;
+        let place = match lanes {
+            1 => "thread.x".to_owned(),
+            lanes => format!("thread.x / {lanes}u"),
+        };
         if options.is_listed {
-            line!(self, "if (thread.x >= left[3]) {{ return; }}")?;
-            line!(self, "let world = list[thread.x];")?;
+            line!(self, "if ({place} >= left[3]) {{ return; }}")?;
+            line!(self, "let world = list[{place}];")?;
         } else {
-            line!(self, "let world = thread.x;")?;
+            line!(self, "let world = {place};")?;
             line!(self, "if (world >= worlds) {{ return; }}")?;
+        }
+        if lanes > 1 {
+            line!(self, "let lane = thread.x % {lanes}u;")?;
+        }
+        if shuffles {
+            line!(self, "let first_lane = place - lane;")?;
         }
         for field in &options.unless {
             let (quad, part) = place_of_field(*field);
@@ -189,7 +231,15 @@ impl Printer<'_> {
         }
         let read = self.inputs(inputs)?;
         self.block(&self.recording.body)?;
+        if lanes > 1 {
+            line!(self, "if (lane == 0u) {{")?;
+            self.indent += 1;
+        }
         self.outputs(inputs, outputs, &read)?;
+        if lanes > 1 {
+            self.indent -= 1;
+            line!(self, "}}")?;
+        }
         writeln!(self.text, "}}")
     }
 
@@ -286,7 +336,20 @@ impl Printer<'_> {
                     let part = COMPONENTS[*part];
                     return line!(self, "let t{number} = {}.{part};", vector(&quad));
                 }
-                line!(self, "let t{number} = {};", self.expressions.op(op))
+                match op {
+                    Op::FromLane(x, lane) => {
+                        let lanes = self.recording.lanes();
+                        let shuffle = format!("subgroupShuffle(VALUE, first_lane + {lane}u)")
+                            .replace(" + 0u", "");
+                        debug_assert!(lane < lanes, "a lane of the world");
+                        self.of_lane(*number, x, &format!("{lane}u"), &shuffle)
+                    }
+                    Op::AcrossLanes(x, apart) => {
+                        let shuffle = format!("subgroupShuffleXor(VALUE, {apart}u)");
+                        self.of_lane(*number, x, &format!("lane ^ {apart}u"), &shuffle)
+                    }
+                    op => line!(self, "let t{number} = {};", self.expressions.op(op)),
+                }
             }
             Statement::Var { name, value } => {
                 line!(self, "var v{name} = {};", self.expressions.operand(*value))
@@ -295,16 +358,12 @@ impl Printer<'_> {
                 line!(self, "v{name} = {};", self.expressions.operand(*value))
             }
             Statement::Store { cell, value } => {
-                line!(
-                    self,
-                    "{} = {};",
-                    scratch(cell),
-                    self.expressions.operand(*value)
-                )
+                let value = self.expressions.operand(*value);
+                self.by_one_lane(|printer| line!(printer, "{} = {value};", scratch(cell)))
             }
             Statement::StoreQuad { quad, numbers } => {
                 let numbers = numbers.map(|x| x.map(|x| self.expressions.operand(x)));
-                self.write(&vector(quad), &numbers)
+                self.by_one_lane(|printer| printer.write(&vector(quad), &numbers))
             }
             Statement::List { name, rows } => match rows.constant() {
                 Some(rows) => line!(self, "var n{name} = {}u;", rows as u32),
@@ -344,6 +403,9 @@ impl Printer<'_> {
                 body,
             } => {
                 let (first, end) = match *bounds {
+                    Bounds::Shared { first, end } => {
+                        return self.shared_loop(*i, (index(first), index(end)), body);
+                    }
                     Bounds::Span { first, end } => (index(first), index(end)),
                     Bounds::Rows { list, capacity } => {
                         line!(self, "let end{i} = min(n{list}, {capacity}u);")?;
@@ -358,6 +420,60 @@ impl Printer<'_> {
                 "if ({}) {{ break; }}",
                 self.expressions.operand(*mask)
             ),
+        }
+    }
+
+    /// A loop of which each lane runs its own iterations.
+    fn shared_loop(
+        &mut self,
+        i: u32,
+        (first, end): (String, String),
+        body: &[Statement],
+    ) -> fmt::Result {
+        let lanes = self.recording.lanes();
+        line!(
+            self,
+            "for (var i{i} = {first} + lane; i{i} < {end}; i{i} += {lanes}u) {{"
+        )?;
+        self.is_shared = true;
+        self.nested(body)?;
+        self.is_shared = false;
+        // another lane may read what this one wrote
+        self.barrier()
+    }
+
+    /// A value of another lane. `place` is that lane's number.
+    fn of_lane(&mut self, number: u32, x: Operand, place: &str, shuffle: &str) -> fmt::Result {
+        let x = self.expressions.operand(x);
+        match self.exchange {
+            Exchange::Subgroup => line!(self, "let t{number} = {};", shuffle.replace("VALUE", &x)),
+            Exchange::Workgroup => {
+                line!(self, "exchange[lane] = {x};")?;
+                line!(self, "workgroupBarrier();")?;
+                line!(self, "let t{number} = exchange[{place}];")?;
+                line!(self, "workgroupBarrier();")
+            }
+        }
+    }
+
+    /// Prints a store; outside of shared loops one lane does it.
+    fn by_one_lane(&mut self, store: impl FnOnce(&mut Self) -> fmt::Result) -> fmt::Result {
+        if self.recording.lanes() == 1 || self.is_shared {
+            return store(self);
+        }
+        line!(self, "if (lane == 0u) {{")?;
+        self.indent += 1;
+        store(self)?;
+        self.indent -= 1;
+        line!(self, "}}")?;
+        self.barrier()
+    }
+
+    /// Orders the accesses of the lanes of a world to memory.
+    fn barrier(&mut self) -> fmt::Result {
+        match self.exchange {
+            Exchange::Subgroup => line!(self, "subgroupBarrier();"),
+            Exchange::Workgroup => line!(self, "storageBarrier();"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::{accepted, c, toy};
 use sim_physics::lane::{Cx, Num, Table, Tables};
 use sim_physics::{each, times, when};
-use sim_record::split::{Limits, split};
+use sim_record::split::{Limits, Prices, split};
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorded, Recorder, Recording, record};
 
@@ -117,7 +117,9 @@ fn a_variable_that_is_read_only_where_it_was_set_does_not_cross_iterations() {
     let limits = Limits {
         kernel: 10_000,
         repeated: 1,
+        repeated_dispatch: 0,
         dispatch: 0,
+        prices: Prices::SOFTWARE,
     };
     let mut read = Vec::new();
     for reads_always in [false, true] {
@@ -150,7 +152,9 @@ fn equal_texts_are_equal_kernels_and_those_of_a_loop_find_their_worlds_in_a_list
         let limits = Limits {
             kernel: 300,
             repeated: 1,
+            repeated_dispatch: 0,
             dispatch: 0,
+            prices: Prices::SOFTWARE,
         };
         let parts = split(&masked(true), &ProgramOptions::default(), limits, 4);
         let texts: Vec<String> = parts.kernels.iter().map(|kernel| kernel.wgsl()).collect();

@@ -2,6 +2,7 @@
 
 mod algebra;
 mod kept_lists;
+mod lanes;
 mod loop_fusion;
 mod programs;
 mod refusals;

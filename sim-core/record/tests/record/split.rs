@@ -4,7 +4,7 @@ use crate::{accepted, c, toy};
 use sim_physics::lane::{Cx, Num, Tables};
 use sim_physics::{break_if, times, when};
 use sim_record::Recording;
-use sim_record::split::{Limits, Part, split};
+use sim_record::split::{Limits, Part, Prices, split};
 use sim_record::wgsl::ProgramOptions;
 
 /// Longer than any recording here.
@@ -123,7 +123,9 @@ fn outputs_in_the_fields_of_inputs_are_written_when_those_are_read() {
             Limits {
                 kernel: most,
                 repeated: most,
+                repeated_dispatch: 0,
                 dispatch: 0,
+                prices: Prices::SOFTWARE,
             },
             4,
         );

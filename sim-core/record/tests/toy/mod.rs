@@ -9,7 +9,7 @@ pub use program::*;
 use sim_physics::lane::memory::Cpu;
 use sim_physics::lane::{Lane, Real, Tables};
 use sim_record::Recording;
-use sim_record::split::{Limits, Split, split};
+use sim_record::split::{Limits, Prices, Split, split};
 use sim_record::wgsl::ProgramOptions;
 
 /// SplitMix64 (Steele, Lea and Flood 2014): the same numbers from a seed on every computer.
@@ -83,9 +83,14 @@ pub fn validated(wgsl: &str) -> naga::Module {
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     let module = naga::front::wgsl::parse_str(wgsl)
         .unwrap_or_else(|e| panic!("{}\n{wgsl}", e.emit_to_string(wgsl)));
-    Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .unwrap_or_else(|e| panic!("{}\n{wgsl}", e.emit_to_string(wgsl)));
+    // naga cannot know which threads share a world, and so branch alike
+    let flags = ValidationFlags::all() - ValidationFlags::CONTROL_FLOW_UNIFORMITY;
+    Validator::new(
+        flags,
+        Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER,
+    )
+    .validate(&module)
+    .unwrap_or_else(|e| panic!("{}\n{wgsl}", e.emit_to_string(wgsl)));
     module
 }
 
@@ -95,7 +100,9 @@ pub fn in_kernels(recording: &Recording, most: usize) -> Split {
     let limits = Limits {
         kernel: most,
         repeated: most,
+        repeated_dispatch: 0,
         dispatch: 0,
+        prices: Prices::SOFTWARE,
     };
     let split = split(recording, &ProgramOptions::default(), limits, spare);
     for kernel in &split.kernels {

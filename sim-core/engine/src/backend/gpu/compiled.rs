@@ -19,9 +19,24 @@ pub(super) struct OutputSources {
     pub finds_contacts: bool,
 }
 
+/// A kernel of physics.
+pub(super) struct Kernel {
+    pub program: Program,
+    /// Threads per world.
+    lanes: u32,
+    workgroup: u32,
+}
+
+impl Kernel {
+    /// Workgroups for so many worlds.
+    pub fn groups(&self, worlds: u32) -> u32 {
+        (worlds * self.lanes).div_ceil(self.workgroup)
+    }
+}
+
 /// Kernels of physics, and the order in which they are dispatched.
 pub(super) struct Kernels {
-    pub kernels: Vec<Program>,
+    pub kernels: Vec<Kernel>,
     pub order: Vec<Part>,
 }
 
@@ -58,20 +73,24 @@ impl Compiled {
         width: u32,
         limit: Duration,
     ) -> Result<Compiled, BackendError> {
-        let source = |label: &str, wgsl: String, workgroup: u32| Source {
-            label: label.to_owned(),
-            wgsl,
-            entry: "main".to_owned(),
-            constants: vec![
-                ("worlds".to_owned(), f64::from(width)),
-                ("workgroup".to_owned(), f64::from(workgroup)),
-            ],
+        let source_of = |label: &str, wgsl: String, workgroup: Option<u32>| {
+            let worlds = ("worlds".to_owned(), f64::from(width));
+            let workgroup = workgroup.map(|n| ("workgroup".to_owned(), f64::from(n)));
+            Source {
+                label: label.to_owned(),
+                wgsl,
+                entry: "main".to_owned(),
+                constants: [worlds].into_iter().chain(workgroup).collect(),
+            }
         };
+        let source = |label: &str, wgsl, workgroup| source_of(label, wgsl, Some(workgroup));
         let threads = workgroups::physics(device.info());
         let physics = |label: &'static str, program: &KernelSequence| {
             let kernels = program.kernels.iter().enumerate();
-            let kernels =
-                kernels.map(|(k, wgsl)| source(&format!("{label} {k}"), wgsl.clone(), threads));
+            let kernels = kernels.map(|(k, kernel)| {
+                let threads = kernel.workgroup.is_none().then_some(threads);
+                source_of(&format!("{label} {k}"), kernel.wgsl.clone(), threads)
+            });
             kernels.collect::<Vec<_>>()
         };
         let mut sources: Vec<Source> = vec![
@@ -112,7 +131,13 @@ impl Compiled {
         let mut next = || compiled.next().expect("a program for every source");
         let [begin, begin_evaluation, check_faults, rows, show] = std::array::from_fn(|_| next());
         let mut kernels = |program: &KernelSequence| Kernels {
-            kernels: program.kernels.iter().map(|_| next()).collect(),
+            kernels: (program.kernels.iter())
+                .map(|kernel| Kernel {
+                    program: next(),
+                    lanes: kernel.lanes,
+                    workgroup: kernel.workgroup.unwrap_or(threads),
+                })
+                .collect(),
             order: program.order.clone(),
         };
         let (step, evaluate) = (kernels(&programs.step), kernels(&programs.evaluate));

@@ -2,14 +2,16 @@
 
 use super::backend::Gpu;
 use super::compiled::{Compiled, OutputSources};
+use super::merged::merged;
 use super::mirror::HostMirror;
 use super::places::Places;
-use super::programs::Programs;
+use super::programs::{How, Programs};
 use super::show;
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
 use super::tile::Tile;
 use super::uploads::Bounds;
+use super::workgroups;
 use crate::backend::noise::Noise;
 use crate::backend::state::{Shape, finds_contacts, start};
 use crate::backend::{Backend, BackendError, Backends, Faults, Groups};
@@ -21,16 +23,19 @@ use sim_physics::arrays::Array;
 use sim_physics::arrays::Layout;
 use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
-use sim_record::split::Limits;
+use sim_record::split::{Limits, Prices};
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// Limits of kernels for hardware GPUs: few kernels, so that values stay in registers. A guess, not measured.
+/// Limits of kernels for hardware GPUs. A unit is about an instruction. A kernel's code should fit the instruction cache, some 128 kB
+/// on NVIDIA's cards. A dispatch and its barrier take as long as a lone warp takes for some 1,500 instructions.
 pub(super) const HARDWARE: Limits = Limits {
-    kernel: 40_000,
+    kernel: 6_000,
     repeated: usize::MAX,
-    dispatch: 0,
+    repeated_dispatch: 0,
+    dispatch: 1_500,
+    prices: Prices::HARDWARE,
 };
 
 /// What a caller asks of a GPU, besides a model and its worlds.
@@ -41,6 +46,8 @@ pub struct Wanted<'a> {
     pub cache: Option<&'a Path>,
     /// Whether the batches of a frame are recorded or encoded.
     pub replay: Replay,
+    /// Threads that share a world; none = what suits the adapter.
+    pub world_threads: Option<usize>,
     /// Limit on the compile time of a program.
     pub compile_limit: Duration,
 }
@@ -93,16 +100,30 @@ impl Gpu {
         let limit = asked.compile_limit;
         let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
-        let constants: Constants<f32> = model.constants().cast();
+        let asked_threads = asked.world_threads;
+        let threads = asked_threads.unwrap_or_else(|| workgroups::of_world(device.info()));
+        let constants: Constants<f32> = match threads {
+            1 => model.constants().cast(),
+            _ => merged(model.constants()).cast(),
+        };
         let m = &constants;
         let computed = show::computed(layout);
         let mut places = Places::new(m, &computed);
         let fields = layout.slots.iter().map(|slot| slot.field);
         let shown = evaluation_stages(m, fields.clone());
         let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
-        let limits = software::limits(device.info()).unwrap_or(HARDWARE);
+        let info = device.info();
+        let how = How {
+            // loops that are cut inside cannot be shared
+            limits: match threads {
+                1 => software::limits(info).unwrap_or(HARDWARE),
+                _ => HARDWARE,
+            },
+            lanes: threads,
+            exchange: workgroups::exchange(info),
+        };
         let substeps = model.substeps();
-        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, limits)
+        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, how)
             .map_err(|e| BackendError::Program {
                 reason: e.to_string(),
             })?;
@@ -116,7 +137,7 @@ impl Gpu {
             contacts: show::contacts(m, &places, layout, shapes),
             finds_contacts,
         };
-        let widest = sizing::widest(&device, m, &places, worlds);
+        let widest = sizing::widest(&device, m, &places, worlds, threads as u32);
         let tiles = (worlds as u64).div_ceil(u64::from(widest));
         let needed = tiles * sizing::memory(m, &places, widest) + 2 * layout.bytes as u64;
         check_memory(&device, coming * worlds, coming as u64 * needed)?;

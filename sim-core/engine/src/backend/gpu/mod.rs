@@ -36,6 +36,7 @@ mod compiled;
 mod create;
 mod frame;
 mod imported;
+mod merged;
 mod mirror;
 mod offline;
 mod places;

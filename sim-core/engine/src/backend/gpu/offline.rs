@@ -1,8 +1,9 @@
 //! The kernels of a model without a device, as benches/gpu/offline judges them.
 
 use super::bookkeeping;
+use super::merged::merged;
 use super::places::Places;
-use super::programs::Programs;
+use super::programs::{How, Programs};
 use super::show;
 use super::workgroups::{BOOKKEEPING, SUBGROUP};
 use super::{create, software};
@@ -13,6 +14,7 @@ use sim_physics::arrays::{Array, Field, Layout};
 use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
 use sim_record::split::Part;
+use sim_record::wgsl::Exchange;
 
 /// The drivers that kernels are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,8 +65,16 @@ impl Offline {
     ///
     /// # Errors
     /// Physics code that cannot be recorded.
-    pub fn new(model: &Model, layout: &Layout, target: Target) -> Result<Offline, BackendError> {
-        let constants: Constants<f32> = model.constants().cast();
+    pub fn new(
+        model: &Model,
+        layout: &Layout,
+        target: Target,
+        lanes: usize,
+    ) -> Result<Offline, BackendError> {
+        let constants: Constants<f32> = match lanes {
+            1 => model.constants().cast(),
+            _ => merged(model.constants()).cast(),
+        };
         let m = &constants;
         let computed: Vec<(Field, usize)> = show::computed(layout);
         let mut places = Places::new(m, &computed);
@@ -82,7 +92,11 @@ impl Offline {
             &shown,
             &computed,
             &wanted,
-            limits,
+            How {
+                limits,
+                lanes,
+                exchange: Exchange::Subgroup,
+            },
         )
         .map_err(|e| BackendError::Program {
             reason: e.to_string(),
@@ -93,10 +107,10 @@ impl Offline {
         let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
         let mut kernels = Vec::new();
         for (name, sequence) in [("step", &programs.step), ("evaluate", &programs.evaluate)] {
-            for (k, wgsl) in sequence.kernels.iter().enumerate() {
+            for (k, kernel) in sequence.kernels.iter().enumerate() {
                 kernels.push(OfflineKernel {
                     label: format!("{name} {k}"),
-                    wgsl: wgsl.clone(),
+                    wgsl: kernel.wgsl.clone(),
                     workgroup: SUBGROUP,
                 });
             }

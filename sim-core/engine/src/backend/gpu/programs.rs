@@ -8,8 +8,8 @@ use sim_physics::lane::Num;
 use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
 use sim_physics::times;
-use sim_record::split::{Limits, Part, split};
-use sim_record::wgsl::ProgramOptions;
+use sim_record::split::{Kernel, Limits, Part, split};
+use sim_record::wgsl::{Exchange, ProgramOptions};
 use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, run};
 
@@ -19,10 +19,27 @@ fn kept() -> Vec<Array> {
     Array::ALL.iter().copied().filter(kept).collect()
 }
 
+/// How kernels are made.
+#[derive(Clone, Copy)]
+pub(super) struct How {
+    pub limits: Limits,
+    /// Threads that share a world where contacts can be.
+    pub lanes: usize,
+    pub exchange: Exchange,
+}
+
+/// A kernel of physics.
+pub(super) struct KernelSource {
+    pub wgsl: String,
+    /// Threads per world.
+    pub lanes: u32,
+    /// Threads of its workgroups, where that is no choice.
+    pub workgroup: Option<u32>,
+}
+
 /// Kernels, and the order in which they are dispatched.
 pub(super) struct KernelSequence {
-    /// Source of each kernel, in WGSL.
-    pub kernels: Vec<String>,
+    pub kernels: Vec<KernelSource>,
     pub order: Vec<Part>,
 }
 
@@ -49,15 +66,20 @@ impl Programs {
         shown: &[StageId],
         computed: &[(Field, usize)],
         wanted: &[Array],
-        limits: Limits,
+        how: How,
     ) -> Result<Programs, RecordError> {
+        // where nothing touches there are no rows to share
+        let lanes = match m.contacts.groups.is_empty() {
+            true => 1,
+            false => how.lanes,
+        };
         // searches on hulls nest loops as deep as a recording may: a loop over substeps does not fit around them
         let (inside, outside) = match m.contacts.groups.is_empty() {
             true => (substeps, 1),
             false => (1, substeps),
         };
-        let (recording, options) = step(m, places, &step_stages(m), inside)?;
-        let (mut step, step_spare) = partition(&recording, &options, limits, places.len);
+        let (recording, options) = step(m, places, &step_stages(m), inside, lanes)?;
+        let (mut step, step_spare) = partition(&recording, &options, how, places.len);
         if outside > 1 {
             step.order = vec![Part::Repeat {
                 iterations: outside,
@@ -66,7 +88,7 @@ impl Programs {
             }];
         }
         let (recording, options) = evaluation(m, places, shown, computed, wanted)?;
-        let (evaluate, evaluate_spare) = partition(&recording, &options, limits, places.len);
+        let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len);
         Ok(Programs {
             step,
             evaluate,
@@ -78,11 +100,24 @@ impl Programs {
 fn partition(
     recording: &Recording,
     options: &ProgramOptions,
-    limits: Limits,
+    how: How,
     spare: u32,
 ) -> (KernelSequence, u32) {
-    let split = split(recording, options, limits, spare);
-    let kernels = split.kernels.iter().map(|kernel| kernel.wgsl()).collect();
+    let options = ProgramOptions {
+        exchange: how.exchange,
+        ..options.clone()
+    };
+    let split = split(recording, &options, how.limits, spare);
+    let source = |kernel: &Kernel| {
+        let lanes = kernel.recording().lanes() as u32;
+        let is_world = lanes > 1 && how.exchange == Exchange::Workgroup;
+        KernelSource {
+            wgsl: kernel.wgsl(),
+            lanes,
+            workgroup: is_world.then_some(lanes),
+        }
+    };
+    let kernels = split.kernels.iter().map(source).collect();
     let sequence = KernelSequence {
         kernels,
         order: split.order,
@@ -114,6 +149,7 @@ fn step(
     places: &Places,
     stages: &[StageId],
     substeps: usize,
+    lanes: usize,
 ) -> Result<(Recording, ProgramOptions), RecordError> {
     let (mut reads, _) = effects(stages);
     let kept = kept();
@@ -124,6 +160,7 @@ fn step(
         }
     }
     let recording = between(m, &reads, &kept, |cx, b| {
+        cx.set_lanes(lanes);
         if substeps == 1 {
             stages.iter().for_each(|stage| run(*stage, cx, m, b));
         } else {

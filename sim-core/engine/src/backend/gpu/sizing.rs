@@ -12,9 +12,23 @@ use sim_physics::constants::Constants;
 const MB: u64 = 1 << 20;
 
 /// Worlds of a tile: as many as its largest buffer can bind, at most all. Tiles are equally wide.
-pub(super) fn widest(device: &Device, m: &Constants<f32>, places: &Places, worlds: usize) -> u32 {
+pub(super) fn widest(
+    device: &Device,
+    m: &Constants<f32>,
+    places: &Places,
+    worlds: usize,
+    threads: u32,
+) -> u32 {
+    let info = device.info();
     let numbers = (places.len as u64).max(m.contacts.memory.len as u64).max(4);
-    let fit = (device.info().binding_max.min(u64::from(u32::MAX)) / (4 * numbers)).max(1);
+    let fit = info.binding_max.min(u64::from(u32::MAX)) / (4 * numbers);
+    // padding included, so that a dispatch has enough workgroups even where each is a single world
+    let lanes = BOOKKEEPING.max(workgroups::physics(info));
+    let dispatched = match threads {
+        1 => u64::from(u32::MAX),
+        _ => u64::from(info.workgroups_max.saturating_sub(lanes)),
+    };
+    let fit = fit.min(dispatched).max(1);
     let tiles = (worlds as u64).div_ceil(fit);
     let width = (worlds as u64).div_ceil(tiles);
     let lanes = BOOKKEEPING.max(workgroups::physics(device.info()));

@@ -168,13 +168,14 @@ impl Tile {
         for part in order {
             match (part, iteration.zip(active)) {
                 (Part::Kernel(k), None) => {
-                    batch.dispatch(&program.kernels[*k], &buffers, groups);
+                    let kernel = &program.kernels[*k];
+                    batch.dispatch(&kernel.program, &buffers, kernel.groups(self.width));
                 }
                 (Part::Kernel(k), Some((iteration, active))) => {
                     buffers.truncate(4);
                     buffers.extend(active.bindings(iteration));
                     let (found, at) = active.groups(iteration);
-                    batch.dispatch_found(&program.kernels[*k], &buffers, found, at);
+                    batch.dispatch_found(&program.kernels[*k].program, &buffers, found, at);
                 }
                 (
                     Part::Repeat {

@@ -1,7 +1,8 @@
-//! Threads per workgroup. Nothing has been measured on hardware GPUs.
+//! Threads per workgroup, and per world. Nothing has been measured on hardware GPUs.
 
 use super::software;
 use sim_device::AdapterInfo;
+use sim_record::wgsl::Exchange;
 
 /// Threads of a subgroup of most GPUs, and of the software driver's workgroups of physics.
 pub(super) const SUBGROUP: u32 = 32;
@@ -15,5 +16,25 @@ pub(super) fn physics(info: &AdapterInfo) -> u32 {
     match software::is_software(info) {
         true => SUBGROUP,
         false => info.subgroup_max.clamp(SUBGROUP, BOOKKEEPING),
+    }
+}
+
+/// Threads that share a world where contacts can be: the rows of its contacts, and the columns of its system. With eight, a subgroup of
+/// 32 has four worlds, which wait for the slowest of four instead of 32.
+const WORLD_THREADS: usize = 8;
+
+/// The threads of a world on an adapter. The software driver computes on the CPU, and more threads only add work there.
+pub(super) fn of_world(info: &AdapterInfo) -> usize {
+    match software::is_software(info) || !info.shuffles {
+        true => 1,
+        false => WORLD_THREADS,
+    }
+}
+
+/// How the threads of a world exchange values.
+pub(super) fn exchange(info: &AdapterInfo) -> Exchange {
+    match info.shuffles {
+        true => Exchange::Subgroup,
+        false => Exchange::Workgroup,
     }
 }

@@ -40,7 +40,7 @@ pub fn solve<F: Num>(pattern: &Pattern, a: &mut [F], x: &mut [F]) {
 /// 1/D of a pivot; 0 for one that is not positive, of which rounding has left nothing. Its unknown is then the coupling to
 /// others alone.
 #[inline(always)]
-fn inverse<F: Num>(pivot: F) -> F {
+pub(crate) fn inverse<F: Num>(pivot: F) -> F {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     F::select(zero.lt(pivot), one.div(pivot), zero)
 }

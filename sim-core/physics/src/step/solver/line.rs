@@ -31,6 +31,73 @@ pub(super) struct Line<'a, F> {
     weight: &'a [F],
     jar: &'a [F],
     jv: &'a [F],
+    /// The rows of joints, where several lanes share a world.
+    own: &'a [OwnRow<F>],
+}
+
+/// A row of each lane of a world: of dry friction, or of a limit. A lane without one has a row that adds nothing.
+pub(super) struct OwnRow<F> {
+    jar: F,
+    jv: F,
+    weight: F,
+    /// Zone and loss of dry friction.
+    bounds: Option<[F; 2]>,
+    /// The law at α = 0.
+    start: Law<F>,
+}
+
+impl<F: Num> OwnRow<F> {
+    /// The law at α of a line.
+    fn law(&self, alpha: F) -> Law<F> {
+        let jar = alpha.fma(self.jv, self.jar);
+        match self.bounds {
+            Some([zone, loss]) => dry_friction(jar, self.weight, zone, loss),
+            None => one_sided(jar, self.weight),
+        }
+    }
+}
+
+/// The rows of dry friction and of limits, of each lane its own; none where a world has one lane.
+#[inline(always)]
+pub(super) fn own_rows<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    params: &[C::F],
+    w: &Workspace<C::F>,
+) -> Vec<OwnRow<C::F>> {
+    let mut rows = Vec::new();
+    if cx.lanes() == 1 {
+        return rows;
+    }
+    let lanes = cx.lanes();
+    let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+    let mut add = |cx: &mut C, part: std::ops::Range<usize>, bounds: Option<[Vec<C::F>; 2]>| {
+        let mut own = |values: &[C::F]| cx.own(values);
+        let [jar, jv, weight] =
+            [&w.jar, &w.jar_minimum, &w.row_weight].map(|values| own(&values[part.clone()]));
+        let bounds = bounds.map(|both| both.map(|values| own(&values)));
+        let start = equality(jar, weight);
+        let mut row = OwnRow {
+            jar,
+            jv,
+            weight,
+            bounds,
+            start,
+        };
+        row.start = row.law(C::F::c(0.0));
+        rows.push(row);
+    };
+    for first in (frictions..limits).step_by(lanes) {
+        let part = first..limits.min(first + lanes);
+        let of_rows = &m.frictions[part.start - frictions..part.end - frictions];
+        let both: Vec<_> = of_rows.iter().map(|row| bounds(m, params, row)).collect();
+        let both = [0, 1].map(|k| both.iter().map(|row| row[k]).collect());
+        add(cx, part, Some(both));
+    }
+    for first in (limits..m.joint_rows()).step_by(lanes) {
+        add(cx, first..m.joint_rows().min(first + lanes), None);
+    }
+    rows
 }
 
 /// What the rows add up to at the start of a line. No closure: one that the compiler keeps as a function has none of the
@@ -68,6 +135,7 @@ impl<'a, F: Num> Line<'a, F> {
         params: &'a [F],
         [curvature, power]: [F; 2],
         w: &'a Workspace<F>,
+        own: &'a [OwnRow<F>],
         acting: Acting,
         corrects: Option<F::Mask>,
     ) -> Self {
@@ -118,6 +186,7 @@ impl<'a, F: Num> Line<'a, F> {
             weight,
             jar,
             jv,
+            own,
         }
     }
 
@@ -138,13 +207,23 @@ impl<'a, F: Num> Line<'a, F> {
         // equalities have one piece only; of the others those of joints are told apart once, not row by row
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
         let (weight, jar, jv) = (self.weight, self.jar, self.jv);
+        let shares = cx.lanes() > 1;
+        if shares {
+            self.add_own(cx, alpha, &mut d);
+        }
         for (r, friction) in (frictions..limits).zip(&m.frictions) {
+            if shares {
+                break;
+            }
             let [zone, loss] = bounds(m, self.params, friction);
             let start = dry_friction(jar[r], weight[r], zone, loss);
             let here = dry_friction(alpha.fma(jv[r], jar[r]), weight[r], zone, loss);
             d.add(alpha, jv[r], start, here);
         }
         for run in self.acting.runs() {
+            if shares {
+                break;
+            }
             let rows = limits + run.start..limits + run.end;
             let both = jar[rows.clone()].iter().zip(&jv[rows.clone()]);
             for ((jar, jv), weight) in both.zip(&weight[rows]) {
@@ -172,6 +251,26 @@ impl<'a, F: Num> Line<'a, F> {
             };
         }
         d
+    }
+}
+
+impl<F: Num> Line<'_, F> {
+    /// Adds the rows of all lanes.
+    fn add_own<C: Cx<F = F>>(&self, cx: &mut C, alpha: F, d: &mut Derivative<F>) {
+        let zero = F::c(0.0);
+        let mut sum = Derivative {
+            slope: zero,
+            curvature: zero,
+            size: zero,
+        };
+        for row in self.own {
+            let here = row.law(alpha);
+            let start = Law { ..row.start };
+            sum.add(alpha, row.jv, start, here);
+        }
+        d.slope = d.slope + cx.sum_lanes(sum.slope);
+        d.curvature = d.curvature + cx.sum_lanes(sum.curvature);
+        d.size = d.size + cx.sum_lanes(sum.size);
     }
 }
 

@@ -50,6 +50,7 @@
 //! |---|---|
 //! | `linear` | the system of an iteration |
 //! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
+//! | `spread` | the system, and products with M, where several lanes share a world |
 //! | `ties` | sums over constraints with Jacobians found at run time |
 //! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
 //! | `turning` | laws of contacts with torsional and rolling friction |
@@ -65,6 +66,7 @@ mod linear;
 mod progress;
 mod refine;
 mod rows;
+mod spread;
 mod ties;
 mod turning;
 
@@ -78,9 +80,10 @@ use crate::constants::ties::TieLaw;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
-use line::{Line, search};
+use line::{Line, own_rows, search};
 use progress::{Found, Pieces, Plan, Progress};
 use rows::{Acting, Jacobian, assemble, cost, forces, residual};
+use spread::Spread;
 
 /// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
 /// solver without code for it.
@@ -131,6 +134,11 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
     let coupling = linear::coupling(cx, m, corrects);
+    let spread = match corrects {
+        Some(_) if !TURNS => Spread::new(cx, m, &b.work.mass_matrix),
+        _ => None,
+    };
+    let spread = spread.as_ref();
     let mut progress = Progress::new(cx, acts, corrects);
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
@@ -138,15 +146,16 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         }
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
-        model_cost::<C, TURNS>(cx, m, b, acting, corrects);
+        model_cost::<C, TURNS>(cx, m, b, acting, corrects, spread);
         // its minimum a⁺, what bodies that touch gain by going there, and how much stiffer than M it is
-        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling);
+        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling, spread);
         // rows that are on another piece of their cost at a⁺
         let pieces = Pieces::compare::<TURNS>(cx, m, b, acting, corrects);
         // the worlds that search the segment from a to a⁺
         let plan = progress.plan(cx, m, &pieces, gain, corrects);
         // where on it the cost is least
-        let found = search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, acting, corrects);
+        let found =
+            search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, acting, corrects, spread);
         // the next a, and the worlds that have arrived
         advance(cx, b, &plan, &found);
         let done = progress.note(cx, &plan, &found, corrects);
@@ -176,6 +185,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
     b: &mut BlockOf<C>,
     acting: Acting,
     corrects: Option<MaskOf<C>>,
+    spread: Option<&Spread<C::F>>,
 ) {
     let w = &mut b.work;
     for j in 0..m.dofs.len() {
@@ -183,13 +193,20 @@ fn model_cost<C: Cx, const TURNS: bool>(
         w.minimum[j] = w.smooth_force[j];
     }
     if let Some(corrects) = corrects {
-        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
+        match spread {
+            None => multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force),
+            Some(spread) => spread.multiply(cx, &w.start, &mut w.joint_force),
+        }
         for j in 0..m.dofs.len() {
             let less = w.minimum[j] - w.joint_force[j];
             w.minimum[j] = C::F::select(corrects, less, w.minimum[j]);
         }
     }
-    w.hessian.copy_from_slice(&w.mass_matrix);
+    match spread {
+        None => w.hessian.copy_from_slice(&w.mass_matrix),
+        // the terms of joints alone
+        Some(_) => w.hessian.fill(C::F::c(0.0)),
+    }
     residual(
         m,
         Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
@@ -212,9 +229,18 @@ fn minimize_model<C: Cx, const TURNS: bool>(
     b: &mut BlockOf<C>,
     corrects: Option<MaskOf<C>>,
     coupling: Option<MaskOf<C>>,
+    spread: Option<&Spread<C::F>>,
 ) -> (C::F, C::F) {
-    let unknown = linear::Unknown::Minimum;
-    let stiffening = linear::solve_system::<_, TURNS>(cx, m, b, unknown, corrects, coupling);
+    let stiffening = match spread {
+        None => {
+            let unknown = linear::Unknown::Minimum;
+            linear::solve_system::<_, TURNS>(cx, m, b, unknown, corrects, coupling)
+        }
+        Some(spread) => {
+            let w = &mut b.work;
+            spread.solve(cx, m, &w.hessian, &mut w.minimum, &mut b.pull, true)
+        }
+    };
     let gain = match corrects {
         Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
             C::F::select(corrects, linear::touched_gain(cx, m, b), C::F::c(UNKNOWN))
@@ -243,6 +269,7 @@ fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, found: &Found<
 
 /// Searches the segment from a to a⁺ for the least cost, and judges whether that ends the solve.
 #[inline(always)]
+#[expect(clippy::too_many_arguments)] // the parts of an iteration
 fn search_segment<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
@@ -251,6 +278,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
     plan: &Plan<C>,
     acting: Acting,
     corrects: Option<MaskOf<C>>,
+    spread: Option<&Spread<C::F>>,
 ) -> Found<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut found = Found {
@@ -263,7 +291,10 @@ fn search_segment<C: Cx, const TURNS: bool>(
         for j in 0..m.dofs.len() {
             w.step[j] = w.minimum[j] - w.start[j];
         }
-        multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force);
+        match spread {
+            None => multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force),
+            Some(spread) => spread.multiply(cx, &w.step, &mut w.joint_force),
+        }
         let (mut curvature, mut power) = (zero, zero);
         for j in 0..m.dofs.len() {
             curvature = w.step[j].fma(w.joint_force[j], curvature);
@@ -273,12 +304,14 @@ fn search_segment<C: Cx, const TURNS: bool>(
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
+        let own = own_rows(cx, m, &b.params, &b.work);
         let line = Line::new::<C, TURNS>(
             cx,
             m,
             &b.params,
             [curvature, power],
             &b.work,
+            &own,
             acting,
             corrects,
         );

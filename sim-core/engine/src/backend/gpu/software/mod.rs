@@ -15,14 +15,16 @@ pub(super) use active_worlds::{ActiveWorlds, Compaction, loops, sources};
 
 use crate::backend::available_memory;
 use sim_device::{AdapterInfo, AdapterKind};
-use sim_record::split::Limits;
+use sim_record::split::{Limits, Prices};
 
 /// Limits of kernels for the software driver. The grasp's Newton loop compiles in three kernels like the others. What crosses from one
 /// kernel to the next costs about a tenth of a step, so they are few.
 pub(super) const LIMITS: Limits = Limits {
     kernel: 16_000,
     repeated: 20_000,
-    dispatch: 4_000,
+    repeated_dispatch: 4_000,
+    dispatch: 0,
+    prices: Prices::SOFTWARE,
 };
 
 /// Limits of kernels, if the adapter is a software driver.

@@ -1,0 +1,262 @@
+//! The system of an iteration where several lanes share a world: its columns are spread over the lanes.
+//!
+//! Lane l of n keeps the columns l, l + n, l + 2 n, … of the full symmetric matrix, a *group* of columns at a time: element (i, g) of
+//! a lane is entry (i, g n + l). Contacts add to all columns at once, so no sum runs over lanes. The factor eliminates from the last
+//! dof to the first, as [`crate::math::factor`] does: each lane gets the eliminated column from its owner, and updates its own.
+
+use super::contacts::{ContactsOf, law_at};
+use crate::constants::Constants;
+use crate::constants::contact::row;
+use crate::each;
+use crate::lane::{Cx, Num};
+use crate::math::factor::inverse;
+use crate::step::contact_rows::class_list;
+
+/// Most dofs of a system that is spread: its columns are kept in registers.
+const DOFS_MAX: usize = 48;
+
+/// Of an assembly: J's weight (6) and the force (3) of a contact. Their places are used by searches and by what follows them.
+const WEIGHT: usize = row::AHEAD;
+const PULL: usize = row::POWER;
+
+/// The mass matrix, spread over the lanes of a world.
+pub(super) struct Spread<F> {
+    lanes: usize,
+    size: usize,
+    /// Columns of a lane.
+    groups: usize,
+    mass: Vec<F>,
+    /// Its diagonal: an entry per column.
+    diagonal: Vec<F>,
+}
+
+/// Values of dofs, another in each lane: an entry per column.
+fn own<C: Cx>(cx: &mut C, lanes: usize, group: usize, values: &[C::F]) -> C::F {
+    let first = group * lanes;
+    cx.own(&values[first..values.len().min(first + lanes)])
+}
+
+impl<F: Num> Spread<F> {
+    /// Spreads the mass matrix; none where a world has one lane, or the system is too large.
+    pub fn new<C: Cx<F = F>>(cx: &mut C, m: &Constants<F::Real>, mass: &[F]) -> Option<Spread<F>> {
+        let (lanes, size) = (cx.lanes(), m.dofs.len());
+        if lanes == 1 || size > DOFS_MAX {
+            return None;
+        }
+        let groups = size.div_ceil(lanes);
+        let entry = |i: usize, j: usize| m.pattern.find(i, j).map_or(F::c(0.0), |at| mass[at]);
+        let mut spread = Spread {
+            lanes,
+            size,
+            groups,
+            mass: Vec::new(),
+            diagonal: Vec::new(),
+        };
+        for i in 0..size {
+            let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
+            for group in 0..groups {
+                spread.mass.push(own(cx, lanes, group, &row));
+            }
+        }
+        let diagonal: Vec<F> = (0..size).map(|i| entry(i, i)).collect();
+        for group in 0..groups {
+            spread.diagonal.push(own(cx, lanes, group, &diagonal));
+        }
+        Some(spread)
+    }
+
+    /// The value of a dof, of its owner.
+    fn of_owner<C: Cx<F = F>>(&self, cx: &mut C, x: &[F], dof: usize) -> F {
+        cx.of_lane(x[dof / self.lanes], dof % self.lanes)
+    }
+
+    /// y = M x, the same in all lanes.
+    pub fn multiply<C: Cx<F = F>>(&self, cx: &mut C, x: &[F], y: &mut [F]) {
+        let mut products = vec![F::c(0.0); self.groups];
+        for (row, x) in self.mass.chunks_exact(self.groups).zip(x) {
+            for (product, entry) in products.iter_mut().zip(row) {
+                *product = entry.fma(*x, *product);
+            }
+        }
+        for (dof, y) in y.iter_mut().enumerate() {
+            *y = self.of_owner(cx, &products, dof);
+        }
+    }
+
+    /// Solves (M + `joints` + Jᵀ W J) x = `vector`, plus Jᵀ f in `vector` if it `pulls`, with sums over contacts. Leaves the right-hand
+    /// side in `pull`, the solution in `vector`. Returns the largest ratio of diagonal entries of the matrix and M.
+    ///
+    /// `joints` is packed as the mass matrix.
+    pub fn solve<C: Cx<F = F>>(
+        &self,
+        cx: &mut C,
+        m: &Constants<F::Real>,
+        joints: &[F],
+        vector: &mut [F],
+        pull: &mut [C::V],
+        pulls: bool,
+    ) -> F {
+        let (size, groups, lanes) = (self.size, self.groups, self.lanes);
+        let entry = |i: usize, j: usize| m.pattern.find(i, j).map_or(F::c(0.0), |at| joints[at]);
+        let mut cells: Vec<C::V> = Vec::with_capacity(size * groups);
+        for i in 0..size {
+            let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
+            for group in 0..groups {
+                let more = own(cx, lanes, group, &row);
+                cells.push(cx.var(self.mass[i * groups + group] + more));
+            }
+        }
+        let mut sides: Vec<C::V> = Vec::with_capacity(groups);
+        for group in 0..groups {
+            let side = own(cx, lanes, group, vector);
+            sides.push(cx.var(side));
+        }
+        for class in 0..m.contacts.classes.len() {
+            self.add_class(cx, &m.contacts, class, &mut cells, &mut sides, pulls);
+        }
+        let mut matrix: Vec<F> = cells.iter().map(|cell| cx.get(cell)).collect();
+        let mut side: Vec<F> = sides.iter().map(|cell| cx.get(cell)).collect();
+        for (dof, pull) in pull.iter_mut().enumerate() {
+            let x = self.of_owner(cx, &side, dof);
+            cx.put(pull, x);
+        }
+        let ratio = self.stiffening(cx, &matrix);
+        self.eliminate(cx, &mut matrix, &mut side, vector);
+        ratio
+    }
+
+    /// Adds the contacts of a class, and writes the pieces that they are on.
+    fn add_class<C: Cx<F = F>>(
+        &self,
+        cx: &mut C,
+        t: &ContactsOf<C>,
+        k: usize,
+        cells: &mut [C::V],
+        sides: &mut [C::V],
+        pulls: bool,
+    ) {
+        let (class, rows) = (&t.classes[k], t.memory.rows);
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let jar = cx.load3(rows, r, row::JAR);
+            let law = law_at(cx, t, r, jar);
+            cx.fill(rows, r, row::STATE, law.state);
+            cx.fill_all(rows, r, WEIGHT, law.stiffness);
+            cx.fill_all(rows, r, PULL, law.force);
+        });
+        // of each group, three times the column of a lane's dof, and 1 where it has one
+        let mut columns: Vec<Option<(F, F)>> = Vec::new();
+        for group in 0..self.groups {
+            let (mut places, mut has) = (Vec::new(), Vec::new());
+            for lane in 0..self.lanes {
+                let dof = group * self.lanes + lane;
+                let place = class.columns.iter().position(|column| column.dof == dof);
+                places.push(F::c(3.0 * place.unwrap_or(0) as f64));
+                has.push(F::c(if place.is_some() { 1.0 } else { 0.0 }));
+            }
+            let dofs = group * self.lanes..(group + 1) * self.lanes;
+            let is_used = class
+                .columns
+                .iter()
+                .any(|column| dofs.contains(&column.dof));
+            columns.push(is_used.then(|| (cx.own(&places), cx.own(&has))));
+        }
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let [nn, nx, ny] = cx.load3(rows, r, WEIGHT);
+            let [xx, xy, yy] = cx.load3(rows, r, WEIGHT + 3);
+            let weight = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
+            let force = cx.load3(rows, r, PULL);
+            let mut stiff = vec![None; self.groups];
+            for (group, column) in columns.iter().enumerate() {
+                let Some((place, has)) = *column else { continue };
+                let mut own = [F::c(0.0); 3];
+                for (i, x) in own.iter_mut().enumerate() {
+                    *x = cx.load_at(rows, r, row::JACOBIAN + i, place) * has;
+                }
+                let mut product = own;
+                for i in 0..3 {
+                    let along = weight[i][1].fma(own[1], weight[i][2] * own[2]);
+                    product[i] = weight[i][0].fma(own[0], along);
+                }
+                stiff[group] = Some(product);
+                if pulls {
+                    let mut sum = cx.get(&sides[group]);
+                    for (x, f) in own.into_iter().zip(force) {
+                        sum = x.fma(f, sum);
+                    }
+                    cx.put(&mut sides[group], sum);
+                }
+            }
+            for (c, column) in class.columns.iter().enumerate() {
+                let jacobian = cx.load3(rows, r, row::JACOBIAN + 3 * c);
+                for (group, stiff) in stiff.iter().enumerate() {
+                    let Some(stiff) = stiff else { continue };
+                    let cell = &mut cells[column.dof * self.groups + group];
+                    let mut sum = cx.get(cell);
+                    for (x, y) in jacobian.into_iter().zip(*stiff) {
+                        sum = x.fma(y, sum);
+                    }
+                    cx.put(cell, sum);
+                }
+            }
+        });
+    }
+
+    /// The largest ratio of diagonal entries of a matrix and M.
+    fn stiffening<C: Cx<F = F>>(&self, cx: &mut C, matrix: &[F]) -> F {
+        let mut largest = F::c(1.0);
+        for group in 0..self.groups {
+            let mut entries = Vec::new();
+            let mut masses = Vec::new();
+            for dof in (group * self.lanes..self.size).take(self.lanes) {
+                entries.push(matrix[dof * self.groups + group]);
+                masses.push(F::c(0.0));
+            }
+            masses.resize(self.lanes, F::c(1.0));
+            // lanes without a dof divide 0 by 1
+            let (entry, missing) = (cx.own(&entries), cx.own(&masses));
+            largest = entry.div(self.diagonal[group] + missing).max(largest);
+        }
+        cx.max_lanes(largest)
+    }
+
+    /// Solves the system: `side` is spread, the solution `x` is the same in all lanes.
+    fn eliminate<C: Cx<F = F>>(&self, cx: &mut C, matrix: &mut [F], side: &mut [F], x: &mut [F]) {
+        let (size, groups, lanes) = (self.size, self.groups, self.lanes);
+        let mut inverses = vec![F::c(0.0); size];
+        for k in (0..size).rev() {
+            let (group_of_k, lane_of_k) = (k / lanes, k % lanes);
+            let pivot = cx.of_lane(matrix[k * groups + group_of_k], lane_of_k);
+            inverses[k] = inverse(pivot);
+            x[k] = cx.of_lane(side[group_of_k], lane_of_k);
+            // L(k, j) of the columns before k, 0 of the others
+            let before = k.div_ceil(lanes);
+            let mut lower = Vec::new();
+            for group in 0..before {
+                let columns = k.min((group + 1) * lanes) - group * lanes;
+                let mut scales = vec![inverses[k]; columns];
+                scales.resize(lanes, F::c(0.0));
+                let scale = cx.own(&scales);
+                let entry = matrix[k * groups + group] * scale;
+                side[group] = entry.fnma(x[k], side[group]);
+                lower.push(entry);
+            }
+            for i in 0..k {
+                let entry = cx.of_lane(matrix[i * groups + group_of_k], lane_of_k);
+                for (group, lower) in lower.iter().enumerate() {
+                    let at = i * groups + group;
+                    matrix[at] = entry.fnma(*lower, matrix[at]);
+                }
+            }
+        }
+        let mut sums = vec![F::c(0.0); groups];
+        for k in 0..size {
+            let known = cx.of_lane(sums[k / lanes], k % lanes);
+            x[k] = (x[k] - known) * inverses[k];
+            for group in (k + 1) / lanes..groups {
+                sums[group] = matrix[k * groups + group].fma(x[k], sums[group]);
+            }
+        }
+    }
+}

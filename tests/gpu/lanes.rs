@@ -1,0 +1,104 @@
+//! Several threads per world: they find what one thread finds, and their number of worlds does not matter.
+//!
+//! The software driver has no shuffles, so a workgroup is a world here, and its threads exchange values through memory.
+
+use crate::common::{Run, noise};
+use crate::{assert_alive, gpu, options};
+use sim_engine::backend::Values;
+use sim_engine::simulation::{Device, Options};
+use sim_model::{Body, Collision, Description, Model, Pose, Robot, Shape, UrdfOptions};
+use sim_physics::arrays::Field;
+use std::sync::Arc;
+
+const FIELDS: [Field; 2] = [Field::JointQ, Field::JointQd];
+
+/// Two links with dry friction and limits; a ball is at the end.
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 -0.1"/><mass value="0.5"/>
+    <inertia ixx="2e-3" iyy="2e-3" izz="5e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0 0 -0.1"/><mass value="0.4"/>
+    <inertia ixx="2e-3" iyy="2e-3" izz="5e-4" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 -0.2"/><geometry><sphere radius="0.05"/></geometry></collision></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-0.3" upper="0.3" effort="20" velocity="10"/><dynamics friction="0.05" damping="0.05"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.2"/><axis xyz="0 1 0"/>
+    <limit lower="-0.5" upper="0.5" effort="20" velocity="10"/><dynamics friction="0.02" damping="0.05"/></joint>
+</robot>"#;
+
+/// The arm hangs over a plane and pushes a ball that lies on it.
+fn scene() -> Arc<Model> {
+    let mut scene = Description::new(1.0 / 240.0, 4);
+    scene.add_ground("ground", 0.0);
+    let mut arm = Robot::from_urdf_text(ARM, "arm.urdf", UrdfOptions::named("arm")).unwrap();
+    arm.pose = Pose::at([0.0, 0.0, 0.46]);
+    scene.add_robot(arm).unwrap();
+    let mut ball = Body::new("ball", Pose::at([0.09, 0.0, 0.05]));
+    let shape = Collision::new(None, Shape::Sphere { radius: 0.05 }, Pose::identity());
+    ball.shapes.push((shape, 500.0));
+    scene.add_body(ball).unwrap();
+    scene.compile().unwrap()
+}
+
+/// World k of a run starts as number `ids[k]`.
+fn played(device: Device, threads: Option<usize>, ids: &[usize], frames: usize) -> Run {
+    let model = scene();
+    let options = Options {
+        world_threads: threads,
+        ..options(device, ids.len(), &FIELDS)
+    };
+    let mut run = Run::new(&model, options);
+    let speed = |id: &usize| (0..2).map(|k| 3.0 * noise(*id, k)).collect::<Vec<_>>();
+    let speeds: Vec<f64> = ids.iter().flat_map(speed).collect();
+    let values = Values::F64(&speeds);
+    run.sim.write(Field::JointQd, 0..2, values, None).unwrap();
+    for _ in 0..frames {
+        run.step();
+    }
+    assert_alive(&run);
+    run
+}
+
+fn state(run: &Run, world: usize) -> Vec<f64> {
+    FIELDS
+        .iter()
+        .flat_map(|field| run.get(*field, world))
+        .collect()
+}
+
+#[test]
+fn worlds_of_several_threads_move_as_on_the_cpu() {
+    const WORLDS: usize = 40;
+    let ids: Vec<usize> = (0..WORLDS).collect();
+    for frames in [1, 40] {
+        let cpu = played(Device::Cpu, None, &ids, frames);
+        for threads in [4, 8] {
+            let here = played(gpu(), Some(threads), &ids, frames);
+            let mut worst = 0.0_f64;
+            for world in 0..WORLDS {
+                let both = state(&here, world).into_iter().zip(state(&cpu, world));
+                worst = both.fold(worst, |worst, (a, b)| worst.max((a - b).abs()));
+            }
+            println!("{threads} threads, {frames} frames: {worst:e}");
+            assert!(
+                worst < 2e-3,
+                "{threads} threads, {frames} frames: {worst:e}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_world_of_several_threads_has_the_same_bits_among_any_number() {
+    let many: Vec<usize> = (0..200).collect();
+    let all = played(gpu(), Some(8), &many, 12);
+    let few = [199, 3, 77];
+    let some = played(gpu(), Some(8), &few, 12);
+    for (k, id) in few.iter().enumerate() {
+        let bits = |run: &Run, world| -> Vec<u64> {
+            state(run, world).into_iter().map(f64::to_bits).collect()
+        };
+        assert_eq!(bits(&some, k), bits(&all, *id), "world {id}");
+    }
+    assert_ne!(state(&all, 0), state(&all, 1));
+}
