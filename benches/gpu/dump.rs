@@ -1,11 +1,14 @@
-//! Writes the kernels of a scene, and states of its run, for benches/gpu/offline. It needs no GPU: the CPU plays the run.
+//! Writes the kernels of a scene, and states of its run, for benches/gpu/offline. It needs no GPU: the CPU plays the run unless
+//! `--on-adapter` is given.
 
 use crate::scenes::{Plan, Scene, WorldSet};
-use crate::{Arguments, FIELDS};
+use crate::{Arguments, FIELDS, chosen};
 use anyhow::Context;
 use serde_json::{Value, json};
+use sim_device::Source;
 use sim_engine::backend::Values;
 use sim_engine::backend::gpu::{Offline, Target};
+use sim_engine::options::Adapter;
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_record::split::Part;
 use std::fs;
@@ -28,9 +31,16 @@ fn write_scene(
 ) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let plan = Plan::new(scene);
+    let device = match arguments.on_adapter {
+        true => Device::Gpu {
+            adapter: Adapter::Index(chosen(arguments.adapter.as_deref())?.index),
+            cache: None,
+        },
+        false => Device::Cpu,
+    };
     let options = Options {
         worlds,
-        device: Device::Cpu,
+        device,
         fields: FIELDS.to_vec(),
         ..Options::default()
     };
@@ -72,6 +82,18 @@ fn write_kernels(
     for (k, kernel) in offline.kernels.iter().enumerate() {
         let file = format!("{k:02}-{}", kernel.label.replace(' ', "-"));
         fs::write(folder.join(format!("{file}.wgsl")), &kernel.wgsl)?;
+        let source = Source {
+            label: kernel.label.clone(),
+            wgsl: kernel.wgsl.clone(),
+            entry: "main".to_owned(),
+            constants: vec![
+                ("worlds".to_owned(), worlds as f64),
+                ("workgroup".to_owned(), f64::from(kernel.workgroup)),
+            ],
+        };
+        let spirv = sim_device::translated(&source, true).map_err(anyhow::Error::msg)?;
+        let bytes = bytemuck::cast_slice(&spirv);
+        fs::write(folder.join(format!("{file}.spv")), bytes)?;
         kernels.push(json!({
             "label": kernel.label,
             "file": file,

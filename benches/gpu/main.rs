@@ -76,6 +76,9 @@ struct Arguments {
     /// Threads that share a world, where contacts can be.
     #[arg(long, default_value_t = 8)]
     lanes: usize,
+    /// The adapter steps the worlds of the dump, not the CPU.
+    #[arg(long)]
+    on_adapter: bool,
     /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
     #[arg(long, hide = true)]
     build_in: Option<PathBuf>,

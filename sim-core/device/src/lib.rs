@@ -72,7 +72,6 @@ pub use batch::{Batch, BatchBuilder, Replay};
 pub use device::Device;
 pub use error::DeviceError;
 pub use memory::{Buffer, Read, Staging, Write};
-#[doc(hidden)]
 pub use module::translated;
 pub use program::Program;
 pub use run::lose_after;

@@ -95,11 +95,10 @@ pub(crate) fn read(source: &Source, spirv: bool, shuffles: bool) -> Result<Modul
     })
 }
 
-/// The SPIR-V of a program. For tests.
+/// A program as Vulkan's drivers get it, for tools and tests that have no device. `shuffles`: it may have subgroup operations.
 ///
 /// # Errors
-/// A program that is wrong, with the reason.
-#[doc(hidden)]
+/// What is wrong with its source.
 pub fn translated(source: &Source, shuffles: bool) -> Result<Vec<u32>, String> {
     Ok(read(source, true, shuffles)?.spirv)
 }
