@@ -5,9 +5,9 @@
 | lockstep, all worlds | the CPU backend, or the adapter that the dump was played on |
 | CUDA C on the processor, the first worlds | the same |
 
-The translations and the CPU backend round every operation as written, so that scenes agree to the bit. Drivers may round
-products and divisions in their own ways. Where lanes share a world, sums have another order. Then rounding differs,
-and iterations may stop one earlier or later.
+The translations and the CPU backend round every operation as written, so that scenes agree to the bit. Drivers may
+round products and divisions in their own ways. Where lanes share a world, sums have another order. Then rounding
+differs, and iterations may stop one earlier or later.
 """
 
 from __future__ import annotations
