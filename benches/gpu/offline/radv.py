@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import subprocess
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from .dump import Scene
@@ -72,7 +72,7 @@ def compiled(path: Path, family: str, environment: dict[str, str], cache: Path) 
     key = hashlib.sha256(path.read_bytes() + f"{family} {tool.name}".encode()).hexdigest()[:24]
     known = cache / "radv" / f"{key}.json"
     if known.exists():
-        return Program(**json.loads(known.read_text()))
+        return replace(Program(**json.loads(known.read_text())), kernel=path.stem)
     done = subprocess.run([str(tool), str(path)], env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{path.name}: {done.stderr}")

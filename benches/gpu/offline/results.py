@@ -18,7 +18,8 @@ Row = dict[str, str]
 
 def commit(root: Path) -> str:
     """The last commit that changed the kernels, with `+` if they have changes that are not committed."""
-    places = ["sim-core", "benches/robots", "benches/gpu/scenes.rs"]
+    crates = (f"sim-core/{name}" for name in ("physics", "record", "stages", "model", "engine/src/backend/gpu"))
+    places = [*crates, "benches/robots", "benches/gpu/scenes.rs"]
 
     def git(*arguments: str) -> str:
         done = subprocess.run(["git", *arguments, "--", *places], cwd=root, capture_output=True, text=True, check=True)
