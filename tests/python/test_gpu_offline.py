@@ -26,6 +26,7 @@ from gpu.offline import (
     cuda_on_cpu,
     dump,
     emulate,
+    loops,
     model,
     parser,
     sass,
@@ -243,9 +244,18 @@ def test_machine_code_runs_as_often_as_the_lines_in_as_many_loops():
     ]
     # MOV comes from a line in the loop, but stands before it
     assert [block.stretch for block in found[:3]] == [0, 1, 2] and [block.depth for block in found] == [0, 1, 0, 0]
-    assert [block.agreeing for block in found] == [1, 4, 2, 1]
+    assert [block.agreeing for block in found[:3]] == [1, 4, 2]
+    # nothing leads behind the end
+    assert [block.is_aside for block in found] == [False, False, False, True]
     load, add = found[1].instructions[1:3]
     assert (load.result_barrier, add.waits, add.stall) == (2, 1 << 2, 4)
+
+
+def test_code_that_was_put_aside_closes_no_loop():
+    # block 3 stands behind the end and jumps back
+    assert loops.depths([[1, 3], [2], [], [1]]) == [0, 0, 0, 0]
+    # the same in a loop of 1 and 2, with a loop of 5 in it
+    assert loops.depths([[1], [2, 4], [1, 5, 3], [], [2], [5, 1]]) == [0, 1, 1, 0, 1, 2]
 
 
 def test_a_warp_waits_for_its_loads():

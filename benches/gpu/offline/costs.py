@@ -43,7 +43,8 @@ def costs(kernel: Kernel, arch: str, cache: Path) -> Costs:
     """The costs of a kernel that is compiled for an architecture."""
     compiled = toolchain.compiled(kernel, arch, cache)
     stretches = bytecode.program(kernel).stretches
-    found = sass.blocks(toolchain.disassembled(Path(compiled.cubin), cache), stretches)
+    everything = sass.blocks(toolchain.disassembled(Path(compiled.cubin), cache), stretches)
+    found = [block for block in everything if not block.is_aside]
     card = CARDS[arch]
     count = len(stretches.lines)
     by_stretch = np.array([block.stretch for block in found])

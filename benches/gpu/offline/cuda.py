@@ -34,10 +34,15 @@ NAME = "kernel_main"
 """Name of the function."""
 
 
-def cuda(kernel: Kernel, worlds: int) -> str:
-    """The kernel for a number of worlds, which it has as a constant."""
+def cuda(kernel: Kernel, worlds: int, names_peers: bool) -> str:
+    """The kernel for a number of worlds, which it has as a constant.
+
+    CUDA's shuffles name the lanes that take part. Where these are a world's, found at run time, ptxas adds checks.
+    Vulkan's shuffles name none, so what is timed names all lanes, and would be wrong where worlds diverge.
+    """
     share = kernel.lanes
-    peers = "0xffffffffu" if share == 32 else f"{(1 << share) - 1}u << (threadIdx.x % 32u / {share}u * {share}u)"
+    whole = share == 32 or not names_peers
+    peers = "0xffffffffu" if whole else f"{(1 << share) - 1}u << (threadIdx.x % 32u / {share}u * {share}u)"
     lines = [
         f"#define worlds {worlds}u",
         f'extern "C" __global__ void __launch_bounds__({kernel.workgroup}) {NAME}({ARGUMENTS}) {{',

@@ -40,7 +40,7 @@ def source(kernel: Kernel, worlds: int) -> str:
     alone = f"for (threadIdx.x = 0; threadIdx.x < {kernel.workgroup}u; threadIdx.x++) thread();"
     loop = alone if kernel.lanes == 1 else f"warp::run(thread, {kernel.workgroup}u);"
     play = PLAY.format(threads=worlds * kernel.lanes, group=kernel.workgroup, loop=loop)
-    text = cuda.PRELUDE + cuda.cuda(kernel, worlds)
+    text = cuda.PRELUDE + cuda.cuda(kernel, worlds, names_peers=True)
     # pragmas are nvcc's; lines of WGSL would hide those of this text
     kept = (line for line in text.replace('_Pragma("unroll 1")', "").splitlines() if not line.startswith("#line"))
     return '#include "cuda_shim.h"\n' + "\n".join(kept) + play

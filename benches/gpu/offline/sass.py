@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass, field
 
+from . import loops
 from .bytecode import Stretches
 
 BYTES = 16
@@ -64,23 +65,59 @@ class Block:
     """Stretch of lines that it runs as often as."""
     agreeing: int = 0
     """Instructions whose line lies in that stretch, or in none."""
+    is_aside: bool = False
+    """Nothing leads here, or only a check of CUDA's shuffles, which Vulkan's have not. It counts nothing."""
+
+    @property
+    def last(self) -> Instruction:
+        """Its last instruction."""
+        return self.instructions[-1]
 
     @property
     def continues(self) -> bool:
         """Whether the next block may follow by itself."""
-        last = self.instructions[-1]
-        return last.operation not in ("EXIT", "RET", "BRA", "JMP", "BRX") or last.is_predicated
+        may_stay = self.last.is_predicated or re.match(r"U?P\d|!U?P\d", self.last.operands) or self.diverges
+        return self.last.operation not in ("EXIT", "RET", "BRA", "JMP", "BRX") or bool(may_stay)
+
+    @property
+    def diverges(self) -> bool:
+        """Whether it ends in a branch that is taken where not all lanes are there."""
+        return self.last.operation == "BRA" and ".DIV" in self.last.modifiers
+
+    @property
+    def target(self) -> str | None:
+        """The label that its last instruction may jump to."""
+        match = re.search(r"\.L_x_\d+", self.last.operands) if self.last.operation == "BRA" else None
+        return match[0] if match else None
 
 
 def blocks(sass: str, stretches: Stretches) -> list[Block]:
     """Blocks of a kernel that nvdisasm printed with `-gi -hex`, in the order of addresses."""
     found, labels = split(sass)
-    loops = [(labels[target], at) for target, at in branches(found) if labels.get(target, at) < at]
-    for block in found:
-        at = block.instructions[0].address
-        block.depth = sum(first <= at <= last for first, last in loops)
-    assign(found, stretches)
+    at = {block.instructions[0].address: k for k, block in enumerate(found)}
+    ways: list[list[int]] = []
+    for k, block in enumerate(found):
+        following = [k + 1] if block.continues and k + 1 < len(found) else []
+        if block.target is not None:
+            to = at[labels[block.target]]
+            following.append(to)
+            if block.diverges:
+                put_aside(found, to)
+        ways.append(following)
+    used = loops.reachable(ways)
+    for k, (block, depth) in enumerate(zip(found, loops.depths(ways), strict=True)):
+        block.depth = depth
+        block.is_aside |= k not in used
+    assign([block for block in found if not block.is_aside], stretches)
     return found
+
+
+def put_aside(found: list[Block], first: int) -> None:
+    """Marks blocks from `first` on, up to the one that jumps back."""
+    for block in found[first:]:
+        block.is_aside = True
+        if not block.continues:
+            break
 
 
 def split(sass: str) -> tuple[list[Block], dict[str, int]]:
@@ -112,13 +149,6 @@ def split(sass: str) -> tuple[list[Block], dict[str, int]]:
             open_instruction.control = int(match[1], 16) >> 41 & 0x1FFFFF
             open_instruction = None
     return found, labels
-
-
-def branches(found: list[Block]) -> list[tuple[str, int]]:
-    """Label and address of each branch."""
-    instructions = (block.instructions[-1] for block in found)
-    targets = ((re.search(r"\.L_x_\d+", last.operands), last) for last in instructions if last.operation == "BRA")
-    return [(match[0], last.address) for match, last in targets if match]
 
 
 def assign(found: list[Block], stretches: Stretches) -> None:

@@ -72,7 +72,7 @@ def compiled(kernel: Kernel, arch: str, cache: Path) -> Compiled:
     Raises:
         SystemExit: The compiler refuses it.
     """
-    text = cuda.PRELUDE + cuda.cuda(kernel, WORLDS)
+    text = cuda.PRELUDE + cuda.cuda(kernel, WORLDS, names_peers=False)
     key = "\n".join([text, arch, *FLAGS, *PACKAGES])
     at = cache / "cubins" / hashlib.sha256(key.encode()).hexdigest()[:24]
     known = at.with_suffix(".json")
