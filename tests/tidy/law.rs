@@ -48,6 +48,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "tree",
             "uses",
             "recording",
+            "lanes",
             "vectorize",
             "wgsl",
             "evaluate",
@@ -70,8 +71,8 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/record/src/split",
         &[
-            "order",
             "cost",
+            "order",
             "kernel",
             "items",
             "live_out",
@@ -154,10 +155,11 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "words",
             "workgroups",
             "mirror",
+            "merged",
             "places",
             "programs",
-            "show",
             "bookkeeping",
+            "show",
             "software",
             "compiled",
             "uploads",
@@ -168,6 +170,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "worlds",
             "frame",
             "create",
+            "offline",
         ],
     ),
     (

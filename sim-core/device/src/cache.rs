@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Head of every file. Increase the number when the file layout or the translation changes.
-const MAGIC: &[u8; 8] = b"tldev 03";
+const MAGIC: &[u8; 8] = b"tldev 04";
 
 /// Translator of WGSL to SPIR-V; another version may give other SPIR-V.
 const WRITER: &str = "naga 30.0.1";

@@ -137,3 +137,37 @@ fn shuffles_are_refused_where_the_device_has_none() {
     assert_eq!(made.is_ok(), device.info().shuffles);
     assert!(device.info().subgroup_min <= device.info().subgroup_max);
 }
+
+#[test]
+fn a_barrier_of_a_subgroup_orders_storage_buffers() {
+    const SOURCE: &str = "
+        @group(0) @binding(0) var<storage, read_write> a: array<f32>;
+        @compute @workgroup_size(32) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+            a[id.x] = 136.0;
+            subgroupBarrier();
+            a[id.x] = a[id.x ^ 136u];
+            subgroupBarrier();
+        }";
+    const CONSTANT: u32 = 43;
+    const CONTROL_BARRIER: u32 = 224;
+    let all = instructions(SOURCE);
+    let values: Vec<(u32, u32)> = (all.iter())
+        .filter(|(code, operands)| *code == CONSTANT && operands.len() == 3)
+        .map(|(_, operands)| (operands[1], operands[2]))
+        .collect();
+    let barriers = all.iter().filter(|(code, _)| *code == CONTROL_BARRIER);
+    let semantics: Vec<u32> = barriers.map(|(_, operands)| operands[2]).collect();
+    assert_eq!(semantics.len(), 2);
+    for id in semantics {
+        let own: Vec<u32> = values
+            .iter()
+            .filter(|one| one.0 == id)
+            .map(|one| one.1)
+            .collect();
+        // acquire and release, storage buffers, memory of the subgroup
+        assert_eq!(own, [0x8 | 0x40 | 0x80]);
+    }
+    // the index is what it was
+    assert!(values.iter().any(|(_, value)| *value == 136));
+    assert!(words(SOURCE)[3] > values.iter().map(|one| one.0).max().unwrap());
+}

@@ -185,7 +185,8 @@ impl<'a> LiveRanges<'a> {
         let mut met = vec![(NEVER, false, false); self.recording.names];
         for i in 0..n {
             let mut body = Cost::default();
-            // what every lane of a world computes again, if any work is shared
+            // what every lane of a world computes again, if any work is shared: it takes no longer while threads are few, and as many
+            // times as there are lanes once they fill the device
             let (mut alike, mut is_wide) = (Cost::default(), false);
             let (mut reads, mut lasting, mut kept) = (0, 0, 0);
             for (j, item) in summaries.iter().enumerate().skip(i) {
@@ -222,7 +223,7 @@ impl<'a> LiveRanges<'a> {
                     break;
                 }
                 let size = (given + left).of_kernel(prices);
-                let again = if is_wide { alike.total(prices) } else { 0 };
+                let again = if is_wide { alike.total(prices) / 2 } else { 0 };
                 let cost = cheapest[i].0.saturating_add(size + again + price);
                 let fits = size <= most || j == i || self.is_joined[at - 1];
                 if fits && !self.is_joined[at] && cost < cheapest[j + 1].0 {

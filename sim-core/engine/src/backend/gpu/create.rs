@@ -10,7 +10,7 @@ use super::show;
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
 use super::tile::Tile;
-use super::uploads::Bounds;
+use super::uploads::{Bounds, has_own_memory};
 use super::workgroups;
 use crate::backend::noise::Noise;
 use crate::backend::state::{Shape, finds_contacts, start};
@@ -144,8 +144,8 @@ impl Gpu {
         let mut compiled = Compiled::new(&device, m, &places, &programs, outputs, widest, limit)?;
         compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
-        let drawn = sizing::has_own_memory(&device)
-            .then(|| device.buffer("frame", layout.bytes.max(64) as u64));
+        let drawn =
+            has_own_memory(&device).then(|| device.buffer("frame", layout.bytes.max(64) as u64));
         let drawn = drawn.transpose()?;
         let bounds = Bounds::new(&device)?;
         let pairs = sizing::pairs(m, sensors);

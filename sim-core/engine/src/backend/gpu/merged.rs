@@ -5,7 +5,7 @@
 //! columns are the dofs of all. A contact's levers are 0 for dofs that do not move its bodies.
 
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::{Class, Column, Contacts, Run, pair, row};
+use sim_physics::constants::contact::{Class, Column, Contacts, Memory, Run, pair, row};
 use sim_physics::lane::{Fixed, Table};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -110,16 +110,39 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         .flat_map(|class| [class.first, class.capacity]);
     t.tables.indices.extend(room.map(|x| x as u32));
     t.classes = classes;
-    // behind all other tables: the room of the old one is too narrow
     let [first_end, capacity_end] = t.row_ends();
-    let memory = &mut t.memory;
-    memory.rows = Table {
-        base: memory.len,
+    let rows = Table {
+        base: t.memory.rows.base,
         stride: (row::JACOBIAN + 3 * widest).next_multiple_of(4),
         rows: first_end + capacity_end - 2,
     };
-    memory.len += memory.rows.stride * memory.rows.rows;
+    replace_rows(&mut t.memory, rows);
     t
+}
+
+/// Gives the rows of contacts another room, and moves what lies behind them.
+fn replace_rows(memory: &mut Memory, rows: Table) {
+    let size = |table: Table| (table.stride * table.rows).next_multiple_of(4);
+    let (old, new) = (size(memory.rows), size(rows));
+    let moved = [
+        &mut memory.poses,
+        &mut memory.origins,
+        &mut memory.counts,
+        &mut memory.mu,
+        &mut memory.cut.corners,
+        &mut memory.cut.candidates,
+        &mut memory.cut.edges,
+        &mut memory.field_candidates,
+        &mut memory.field_cells,
+        &mut memory.field_prisms,
+    ];
+    for table in moved {
+        if table.base > rows.base {
+            table.base = table.base + new - old;
+        }
+    }
+    memory.len = memory.len + new - old;
+    memory.rows = rows;
 }
 
 /// A class of the pairs of some classes; `t` has the new scalars of pairs already, and the old classes.

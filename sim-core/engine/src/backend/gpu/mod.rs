@@ -7,6 +7,11 @@
 //! recording. A few more kernels do the bookkeeping (`bookkeeping`: rows, faults, delays) or write a frame (`show`). They are dispatched
 //! once a frame: one for each command that waits, two around the substeps, and one or, with fields of contacts, two for the frame.
 //!
+//! # Threads per world
+//! Where contacts can be, hardware has eight threads per world (`workgroups`). They share the rows of contacts, and each keeps columns of
+//! the solver's system (`sim_physics::step::solver`, `spread`). Classes of contacts of the same trees are merged for that (`merged`).
+//! Kernels without such work have one thread per world. Sums over threads have a fixed order.
+//!
 //! # Memory
 //! Programs read and write *fields* (`places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and
 //! commands come first, then what stages leave for each other. Contacts lie likewise in a buffer of their own. A *tile* is as many

@@ -37,11 +37,6 @@ pub(super) fn widest(
         .min(u64::from(u32::MAX)) as u32
 }
 
-/// Whether programs reach host memory only over a bus: they then read and write copies in the adapter's memory.
-pub(super) fn has_own_memory(device: &Device) -> bool {
-    device.info().kind == AdapterKind::Discrete
-}
-
 /// Memory of a tile, staging buffers included [bytes].
 pub(super) fn memory(m: &Constants<f32>, places: &Places, width: u32) -> u64 {
     let state = u64::from(places.state);

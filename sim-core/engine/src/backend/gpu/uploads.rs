@@ -9,10 +9,11 @@
 use super::bookkeeping;
 use super::compiled::{Compiled, constant};
 use super::places::Places;
-use super::sizing;
 use super::workgroups::BOOKKEEPING;
 use crate::backend::{BackendError, Input};
-use sim_device::{Batch, BatchBuilder, Buffer, Device, DeviceError, Program, Replay, Staging};
+use sim_device::{
+    AdapterKind, Batch, BatchBuilder, Buffer, Device, DeviceError, Program, Replay, Staging,
+};
 use sim_physics::arrays::Field;
 use sim_physics::constants::Constants;
 use std::ops::Range;
@@ -50,6 +51,11 @@ pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize
     joints.into_iter().chain(models).chain(loads)
 }
 
+/// Whether programs reach host memory only over a bus: they then read and write copies in the adapter's memory.
+pub(super) fn has_own_memory(device: &Device) -> bool {
+    device.info().kind == AdapterKind::Discrete
+}
+
 /// Words that the host writes and programs read.
 struct Upload {
     staged: Staging,
@@ -59,7 +65,7 @@ struct Upload {
 
 impl Upload {
     fn new(device: &Device, label: &str, bytes: u64) -> Result<Upload, DeviceError> {
-        let own = sizing::has_own_memory(device).then(|| device.buffer(label, bytes));
+        let own = has_own_memory(device).then(|| device.buffer(label, bytes));
         Ok(Upload {
             staged: device.staging(label, bytes)?,
             own: own.transpose()?,

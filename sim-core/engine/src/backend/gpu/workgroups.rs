@@ -1,7 +1,6 @@
 //! Threads per workgroup, and per world. Nothing has been measured on hardware GPUs.
 
-use super::software;
-use sim_device::AdapterInfo;
+use sim_device::{AdapterInfo, AdapterKind};
 use sim_record::wgsl::Exchange;
 
 /// Threads of a subgroup of most GPUs, and of the software driver's workgroups of physics.
@@ -13,9 +12,9 @@ pub(super) const BOOKKEEPING: u32 = 64;
 /// Kernels of physics need many registers: a workgroup is one subgroup, so that none waits for another and no thread of it idles.
 /// A driver that does not tell its subgroups reports at most 128 threads; more than 64 no GPU has.
 pub(super) fn physics(info: &AdapterInfo) -> u32 {
-    match software::is_software(info) {
-        true => SUBGROUP,
-        false => info.subgroup_max.clamp(SUBGROUP, BOOKKEEPING),
+    match info.kind {
+        AdapterKind::Software => SUBGROUP,
+        _ => info.subgroup_max.clamp(SUBGROUP, BOOKKEEPING),
     }
 }
 
@@ -25,9 +24,10 @@ const WORLD_THREADS: usize = 8;
 
 /// The threads of a world on an adapter. The software driver computes on the CPU, and more threads only add work there.
 pub(super) fn of_world(info: &AdapterInfo) -> usize {
-    match software::is_software(info) || !info.shuffles {
-        true => 1,
-        false => WORLD_THREADS,
+    match info.kind {
+        AdapterKind::Software => 1,
+        _ if !info.shuffles => 1,
+        _ => WORLD_THREADS,
     }
 }
 
