@@ -17,7 +17,7 @@ from .dump import Scene
 DESCRIBED: dict[str, set[str]] = {
     "rows": {"d409fc48"},
     "begin": {"49c8b5d7"},
-    "check faults": {"0dabda1d"},
+    "check faults": {"0dabda1d", "8763f8f4"},
     "show": {"447bc884"},
 }
 """Fingerprints of the sources that `ends` describes."""
