@@ -45,11 +45,12 @@ override workgroup: u32 = 32u;
 @group(0) @binding(3) var<storage, read> indices: array<u32>;
 
 @compute @workgroup_size(workgroup)
-fn main(@builtin(global_invocation_id) thread: vec3<u32>) {
+fn main(@builtin(global_invocation_id) thread: vec3<u32>, @builtin(subgroup_invocation_id) place: u32) {
 """
 # eight lanes of a world share its rows, add up, and the first writes the sum and what the fourth has
 SHARED = """    let world = thread.x / 8u;
     let lane = thread.x % 8u;
+    let first_lane = place - lane;
     if (world >= worlds) { return; }
     let x0 = fields[0u * worlds + world].x;
     let end5 = min(u32(x0), 20u);
@@ -65,7 +66,8 @@ SHARED = """    let world = thread.x / 8u;
     v1 = v1 + subgroupShuffleXor(v1, 1u);
     v1 = v1 + subgroupShuffleXor(v1, 2u);
     v1 = v1 + subgroupShuffleXor(v1, 4u);
-    let t5 = subgroupShuffle(t4, thread.x % 32u / 8u * 8u + 3u);
+    subgroupBarrier();
+    let t5 = subgroupShuffle(t4, first_lane + 3u);
     if (lane == 0u) {
         fields[1u * worlds + world] = vec4<f32>(v1, t5, f32(end5), 0.5f);
     }

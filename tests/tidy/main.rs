@@ -241,12 +241,17 @@ fn unsafe_stands_where_it_may() {
     assert_eq!(found, listed);
 }
 
+/// Code for several threads per world: it is recorded, but no CPU runs it, so it may take memory.
+const RECORDED_ALONE: [&str; 2] = ["solver/own_rows.rs", "solver/spread.rs"];
+
 #[test]
 fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {
     for path in files("sim-core/physics/src/step", ".rs") {
+        let takes_memory = RECORDED_ALONE.iter().any(|file| path.ends_with(file));
         for line in code(&path) {
             for word in ["Result<", "Vec<", "vec!", "Box<", "backend"] {
-                assert!(!begins_word(&line, word), "{path}: {line}");
+                let is_allowed = takes_memory && matches!(word, "Vec<" | "vec!");
+                assert!(is_allowed || !begins_word(&line, word), "{path}: {line}");
             }
         }
     }

@@ -14,6 +14,9 @@ mod control;
 pub mod memory;
 pub mod scalar;
 pub mod simd;
+mod tables;
+
+pub use tables::{Fixed, Table, Tables};
 
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
@@ -219,37 +222,6 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn scatter(self, mask: Self::Mask, to: &mut [Self], rows: Self, stride: usize);
     /// Reads one scalar for every world, at `places`: whole, and inside `from`.
     fn gather(from: &[Self::Real], places: Self) -> Self;
-}
-
-/// A table in scratch memory: `rows` rows of `stride` scalars, each with a value per world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Table {
-    /// First scalar of row 0.
-    pub base: usize,
-    /// Scalars per row.
-    pub stride: usize,
-    /// Rows that fit.
-    pub rows: usize,
-}
-
-/// A table of the model: the same for every world, read at a run-time index.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Fixed {
-    /// First scalar of row 0.
-    pub base: usize,
-    /// Scalars per row.
-    pub stride: usize,
-    /// Rows.
-    pub rows: usize,
-}
-
-/// The tables of a model, one after another: scalars, and indices into tables.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tables<R> {
-    /// For [`Cx::constant`] and [`Cx::pick`].
-    pub numbers: Vec<R>,
-    /// For [`Cx::index`].
-    pub indices: Vec<u32>,
 }
 
 /// The execution context: variables, scratch rows, and control flow with a mask of active worlds.

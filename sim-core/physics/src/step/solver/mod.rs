@@ -55,6 +55,7 @@
 //! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
 //! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `line` | the line search |
+//! | `own_rows` | its rows of joints, where several lanes share a world |
 //! | `progress` | which worlds search, and which have arrived |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
 
@@ -63,6 +64,7 @@ mod cones;
 mod contacts;
 mod line;
 mod linear;
+mod own_rows;
 mod progress;
 mod refine;
 mod rows;
@@ -80,7 +82,8 @@ use crate::constants::ties::TieLaw;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
-use line::{Line, own_rows, search};
+use line::{Line, search};
+use own_rows::own_rows;
 use progress::{Found, Pieces, Plan, Progress};
 use rows::{Acting, Jacobian, assemble, cost, forces, residual};
 use spread::Spread;
