@@ -203,25 +203,25 @@ def test_a_frame_with_another_torque_is_noticed(scene: dump.Scene, cache: Path):
 
 # nvdisasm of a loop over rows for sm_90: what a thread has loaded is squared and added up, then stored
 SASS = """
-	//## File "/tmp/kernel.wgsl", line 10
+	//## File "/out/kernel.wgsl", line 10
         /*0090*/                   LDC.64 R4, c[0x0][0x210] ;   /* 0x00008400ff047b82 */
                                                                 /* 0x000e220000000a00 */
-	//## File "/tmp/kernel.wgsl", line 12
+	//## File "/out/kernel.wgsl", line 12
         /*00d0*/                   MOV R0, RZ ;                 /* 0x000000ff00007202 */
                                                                 /* 0x000fc00000000f00 */
 .L_x_2:
-	//## File "/tmp/kernel.wgsl", line 12
+	//## File "/out/kernel.wgsl", line 12
         /*0100*/                   IMAD.WIDE.U32 R2, R3, 0x10, R4 ;  /* 0x0000001003027825 */
                                                                 /* 0x001fca00078e0004 */
         /*0110*/                   LDG.E.64 R12, desc[UR4][R2.64] ;  /* 0x00000004020c7981 */
                                                                 /* 0x000ea4000c1e9b00 */
         /*0120*/                   FADD.FTZ R11, R12, R12 ;     /* 0x0000000c0c0b7221 */
                                                                 /* 0x004fc80000010000 */
-	//## File "/tmp/kernel.wgsl", line 11
+	//## File "/out/kernel.wgsl", line 11
         /*01f0*/              @!P0 BRA `(.L_x_2) ;              /* 0xfffffffc00bc8947 */
                                                                 /* 0x000fea000383ffff */
 .L_x_1:
-	//## File "/tmp/kernel.wgsl", line 14
+	//## File "/out/kernel.wgsl", line 14
         /*0230*/                   STG.E desc[UR4][R2.64], R11 ;  /* 0x0000000b02007986 */
                                                                 /* 0x000fe2000c101904 */
         /*0240*/                   EXIT ;                       /* 0x000000000000794d */
