@@ -65,6 +65,7 @@ impl<'a, F: Num> Line<'a, F> {
     /// `curvature` is sᵀ M s, `power` is |τ a|, and `jar_minimum` has the change of `jar` over the segment. The worlds that
     /// `corrects` holds in have contacts; of these `AHEAD` becomes the change of `JAR`.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments)] // the parts of a line
     pub fn new<C: Cx<F = F>, const TURNS: bool>(
         cx: &mut C,
         m: &Constants<F::Real>,
