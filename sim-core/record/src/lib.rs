@@ -42,6 +42,7 @@ mod record;
 mod recorder;
 mod recording;
 mod scalar;
+mod schedule;
 pub mod split;
 mod state;
 mod tree;

@@ -234,6 +234,8 @@ arrays! { m;
 
         // body by body: acceleration, then force
         force: Force [Spatial; m.bodies.len()] Scratch "–";
+        // at zero joint acceleration
+        rest_acceleration: RestAcceleration [Spatial; m.bodies.len()] Scratch "m/s², rad/s²";
         // copies that are factored in place
         hessian: Hessian [Scalar; m.pattern.len()] Scratch "–";
         coupled_hessian: CoupledHessian [Scalar; m.coupled.pattern.len()] Scratch "–";

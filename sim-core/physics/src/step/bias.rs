@@ -29,12 +29,14 @@ impl Stage for Bias {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        // `force` holds the acceleration of a body until the backward pass
-        accelerations_at_rest(cx, m, b, -gravity(m, &b.params));
-        let w = &mut b.work;
+        let base = -gravity(m, &b.params);
+        // forces at once, so that few accelerations are kept at a time
         for k in 0..m.bodies.len() {
-            w.force[k] = w.inertia[k].force(w.velocity[k][ANGULAR], w.force[k]);
+            accelerate(cx, m, b, k, base);
+            let w = &mut b.work;
+            w.force[k] = w.inertia[k].force(w.velocity[k][ANGULAR], w.rest_acceleration[k]);
         }
+        let w = &mut b.work;
         // children follow their parents, so in the backward pass the force of a body is complete when it is reached
         for (k, body) in m.bodies.iter().enumerate().rev() {
             let force = w.force[k];
@@ -61,8 +63,8 @@ pub(super) fn along<F: Num>(motion: Motion, axis: &Spatial<F>, force: Spatial<F>
     }
 }
 
-/// Writes the velocity of each body, and to `force` the acceleration of its point, and its angular one, at zero joint
-/// acceleration over a base that has `base`.
+/// Writes the velocity of each body, the acceleration of its point and its angular one, at zero joint acceleration over a base
+/// that has `base`.
 #[inline(always)]
 pub(super) fn accelerations_at_rest<C: Cx>(
     cx: &mut C,
@@ -70,21 +72,33 @@ pub(super) fn accelerations_at_rest<C: Cx>(
     b: &mut BlockOf<C>,
     base: Vec3<C::F>,
 ) {
-    let base = Spatial([base, Vec3::zero()]);
-    for (k, body) in m.bodies.iter().enumerate() {
-        let own = joint_velocity(cx, b, body);
-        let w = &mut b.work;
-        let (velocity, acceleration) = match body.parent {
-            Some(parent) => {
-                let v = w.velocity[parent];
-                let carried = carried(body.motion, w.force[parent], v, own, w.arm[k]);
-                (v + own, carried)
-            }
-            None => (own, base),
-        };
-        w.velocity[k] = velocity;
-        w.force[k] = acceleration;
+    for k in 0..m.bodies.len() {
+        accelerate(cx, m, b, k, base);
     }
+}
+
+/// [`accelerations_at_rest`] of body `k`, whose parent has its own.
+#[inline(always)]
+fn accelerate<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    k: usize,
+    base: Vec3<C::F>,
+) {
+    let body = &m.bodies[k];
+    let own = joint_velocity(cx, b, body);
+    let w = &mut b.work;
+    let (velocity, acceleration) = match body.parent {
+        Some(parent) => {
+            let v = w.velocity[parent];
+            let carried = carried(body.motion, w.rest_acceleration[parent], v, own, w.arm[k]);
+            (v + own, carried)
+        }
+        None => (own, Spatial([base, Vec3::zero()])),
+    };
+    w.velocity[k] = velocity;
+    w.rest_acceleration[k] = acceleration;
 }
 
 /// Acceleration of a body at `arm` from the point of its carrier, whose own and whose velocity are given.

@@ -2,7 +2,7 @@
 
 use super::cost::{self, Prices};
 use crate::recording::Recording;
-use crate::wgsl::{ProgramOptions, wgsl};
+use crate::wgsl::{ProgramOptions, sequence, wgsl};
 use sim_physics::lane::Tables;
 
 /// A part of a recording, from fields to fields.
@@ -16,6 +16,17 @@ impl Kernel {
     /// The kernel as WGSL.
     pub fn wgsl(&self) -> String {
         wgsl(&self.recording, &self.options)
+    }
+
+    /// This kernel and another one that runs after it, as one program.
+    ///
+    /// # Panics
+    /// As [`sequence`] does.
+    pub fn wgsl_before(&self, next: &Kernel) -> String {
+        sequence(&[
+            (&self.recording, &self.options),
+            (&next.recording, &next.options),
+        ])
     }
 
     /// What it computes, from the fields `options().inputs` to `options().outputs`.

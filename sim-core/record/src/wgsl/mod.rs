@@ -20,13 +20,24 @@
 //! WGSL lets an implementation fuse a product with a sum, flush values below 2^-126 to 0, and assume that nothing is infinite or NaN. An
 //! infinite constant is therefore printed as the largest finite one of its sign. The recorder refuses NaN constants.
 
+/// Writes one line, indented.
+macro_rules! line {
+    ($printer:ident, $($arg:tt)*) => {{
+        for _ in 0..$printer.indent {
+            $printer.text.push_str("    ");
+        }
+        writeln!($printer.text, $($arg)*)
+    }};
+}
+
 mod expression;
+mod fields;
 
 use crate::recording::Recording;
 use crate::tree::{Bounds, Op, Operand, Statement};
 use crate::vectorize::WIDTH;
 use expression::{COMPONENTS, Expressions, index, scratch, vector};
-use std::collections::BTreeMap;
+use fields::{Fields, place_of_field};
 use std::fmt::{self, Write};
 
 /// How the lanes of a world exchange values.
@@ -48,8 +59,8 @@ pub struct ProgramOptions {
     pub workgroup: u32,
     /// Field of each input; none: 0, 1, 2, …
     pub inputs: Option<Vec<u32>>,
-    /// Field of each output; none: the fields after the inputs'. It may be that of an input: all
-    /// inputs are read before any output is written.
+    /// Field of each output; none: the fields after the inputs'. It may be that of an input: such a
+    /// field is written after all are read.
     pub outputs: Option<Vec<u32>>,
     /// Fields: a world for which one of them is not 0 is skipped.
     pub unless: Vec<u32>,
@@ -103,23 +114,77 @@ impl Default for ProgramOptions {
 /// # Panics
 /// If `inputs` or `outputs` does not give a field for each of the recording's.
 pub fn wgsl(recording: &Recording, options: &ProgramOptions) -> String {
-    let (inputs, outputs) = options.fields(recording);
-    let recording = &recording.vectorized();
-    let mut printer = Printer {
-        recording,
-        expressions: Expressions {
-            recording,
-            single: recording.single_parts(),
-        },
-        text: String::new(),
-        indent: 1,
-        exchange: options.exchange,
-        is_shared: false,
+    sequence(&[(recording, options)])
+}
+
+/// Recordings that run one after another, as one program of the first one's options. Each reads fields that those before it wrote.
+///
+/// # Panics
+/// If there is none, if `inputs` or `outputs` does not give a field for each of a recording's, or if there are several and one has
+/// several lanes or skips worlds.
+pub fn sequence(parts: &[(&Recording, &ProgramOptions)]) -> String {
+    let bodies: Vec<Body> = parts
+        .iter()
+        .map(|(recording, options)| Body::new(recording, options))
+        .collect();
+    let [(_, options), ..] = parts else {
+        panic!("a program has a recording");
     };
-    printer
-        .program(options, &inputs, &outputs)
-        .expect("writing to a string does not fail");
-    printer.text
+    let is_one = parts.len() == 1;
+    let may_follow = |(recording, options): &(&Recording, &ProgramOptions)| {
+        recording.lanes() == 1 && !options.is_listed && options.unless.is_empty()
+    };
+    assert!(
+        is_one || parts.iter().all(may_follow),
+        "recordings in sequence have one lane, and run in all worlds"
+    );
+    let mut text = String::new();
+    for (k, body) in bodies.iter().enumerate() {
+        let mut printer = Printer {
+            recording: &body.recording,
+            expressions: Expressions {
+                recording: &body.recording,
+                single: body.recording.single_parts(),
+            },
+            text,
+            indent: 1,
+            exchange: options.exchange,
+            is_shared: false,
+        };
+        let printed = match k {
+            0 => printer.head(options, &bodies),
+            _ => Ok(()),
+        };
+        printed
+            .and_then(|()| match is_one {
+                true => printer.body(body),
+                false => printer.scope(body),
+            })
+            .expect("writing to a string does not fail");
+        text = printer.text;
+    }
+    text.push_str("}\n");
+    text
+}
+
+/// A recording as it is printed, and the fields of its inputs and outputs.
+struct Body {
+    recording: Recording,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+}
+
+impl Body {
+    fn new(recording: &Recording, options: &ProgramOptions) -> Body {
+        let (inputs, outputs) = options.fields(recording);
+        let recording = recording.vectorized();
+        let goals = fields::written_early(&recording, &inputs, &outputs);
+        Body {
+            recording: recording.scheduled(&goals),
+            inputs,
+            outputs,
+        }
+    }
 }
 
 struct Printer<'a> {
@@ -132,23 +197,9 @@ struct Printer<'a> {
     is_shared: bool,
 }
 
-/// Writes one line, indented.
-macro_rules! line {
-    ($printer:ident, $($arg:tt)*) => {{
-        for _ in 0..$printer.indent {
-            $printer.text.push_str("    ");
-        }
-        writeln!($printer.text, $($arg)*)
-    }};
-}
-
 impl Printer<'_> {
-    fn program(
-        &mut self,
-        options: &ProgramOptions,
-        inputs: &[u32],
-        outputs: &[u32],
-    ) -> fmt::Result {
+    /// Everything before the first body.
+    fn head(&mut self, options: &ProgramOptions, bodies: &[Body]) -> fmt::Result {
         writeln!(self.text, "override worlds: u32;")?;
         // a workgroup that is a world has as many threads; then no override may have the name of its memory
         let lanes = self.recording.lanes();
@@ -165,13 +216,14 @@ impl Printer<'_> {
             self.text,
             "@group(0) @binding(0) var<storage, read_write> fields: array<vec4<f32>>;"
         )?;
-        if self.recording.scratch() > 0 {
+        if bodies.iter().any(|body| body.recording.scratch() > 0) {
             writeln!(
                 self.text,
                 "@group(0) @binding(1) var<storage, read_write> scratch: array<vec4<f32>>;"
             )?;
         }
-        let (numbers, indices) = self.recording.reads_tables();
+        let tables = bodies.iter().map(|body| body.recording.reads_tables());
+        let (numbers, indices) = tables.fold((false, false), |a, b| (a.0 | b.0, a.1 | b.1));
         if numbers {
             writeln!(
                 self.text,
@@ -229,70 +281,36 @@ impl Printer<'_> {
                 "if (fields[{quad}u * worlds + world].{part} != 0.0f) {{ return; }}"
             )?;
         }
-        let read = self.inputs(inputs)?;
-        self.block(&self.recording.body)?;
+        Ok(())
+    }
+
+    /// A body whose names are its own.
+    fn scope(&mut self, body: &Body) -> fmt::Result {
+        line!(self, "{{")?;
+        self.indent += 1;
+        self.body(body)?;
+        self.indent -= 1;
+        line!(self, "}}")
+    }
+
+    fn body(&mut self, body: &Body) -> fmt::Result {
+        let lanes = self.recording.lanes();
+        let fields = Fields::new(self.recording, &body.inputs, &body.outputs);
+        for (k, statement) in self.recording.body.iter().enumerate() {
+            self.inputs(&fields, k)?;
+            self.statement(statement)?;
+            self.outputs(&fields, k + 1)?;
+        }
+        let end = self.recording.body.len() + 1;
+        self.inputs(&fields, end)?;
         if lanes > 1 {
             line!(self, "if (lane == 0u) {{")?;
             self.indent += 1;
         }
-        self.outputs(inputs, outputs, &read)?;
+        self.outputs(&fields, end + 1)?;
         if lanes > 1 {
             self.indent -= 1;
             line!(self, "}}")?;
-        }
-        writeln!(self.text, "}}")
-    }
-
-    /// Reads the live inputs, vector by vector; returns the vectors that are read whole.
-    fn inputs(&mut self, inputs: &[u32]) -> Result<Vec<u32>, fmt::Error> {
-        let mut quads: BTreeMap<u32, Vec<(u32, char)>> = BTreeMap::new();
-        for i in self.recording.live_inputs() {
-            let (quad, part) = place_of_field(inputs[i as usize]);
-            quads.entry(quad).or_default().push((i, part));
-        }
-        let mut whole = Vec::new();
-        for (quad, numbers) in quads {
-            if let [(i, part)] = numbers[..] {
-                line!(self, "let x{i} = fields[{quad}u * worlds + world].{part};")?;
-                continue;
-            }
-            line!(self, "let q{quad} = fields[{quad}u * worlds + world];")?;
-            for (i, part) in numbers {
-                line!(self, "let x{i} = q{quad}.{part};")?;
-            }
-            whole.push(quad);
-        }
-        Ok(whole)
-    }
-
-    /// Writes the outputs, vector by vector; one that is an input in its own field is there already.
-    fn outputs(&mut self, inputs: &[u32], outputs: &[u32], read: &[u32]) -> fmt::Result {
-        let mut quads: BTreeMap<u32, [Option<String>; WIDTH]> = BTreeMap::new();
-        for (x, field) in self.recording.outputs.iter().zip(outputs) {
-            let stays = match *x {
-                Operand::Value(number) => inputs.get(number as usize) == Some(field),
-                _ => false,
-            };
-            if !stays {
-                let place = *field as usize % WIDTH;
-                quads.entry(field / WIDTH as u32).or_default()[place] =
-                    Some(self.expressions.operand(*x));
-            }
-        }
-        for (quad, mut numbers) in quads {
-            let place = format!("fields[{quad}u * worlds + world]");
-            let count = numbers.iter().flatten().count();
-            let mut is_read = read.contains(&quad);
-            if count + 1 == WIDTH && !is_read {
-                line!(self, "let q{quad} = {place};")?;
-                is_read = true;
-            }
-            if count > 1 && is_read {
-                for (number, part) in numbers.iter_mut().zip(COMPONENTS) {
-                    number.get_or_insert_with(|| format!("q{quad}.{part}"));
-                }
-            }
-            self.write(&place, &numbers)?;
         }
         Ok(())
     }
@@ -476,10 +494,4 @@ impl Printer<'_> {
             Exchange::Workgroup => line!(self, "storageBarrier();"),
         }
     }
-}
-
-/// The vector that a field lies in, and its component.
-fn place_of_field(field: u32) -> (u32, char) {
-    let width = WIDTH as u32;
-    (field / width, COMPONENTS[(field % width) as usize])
 }

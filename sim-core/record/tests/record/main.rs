@@ -7,6 +7,7 @@ mod loop_fusion;
 mod programs;
 mod refusals;
 mod refused_blocks;
+mod schedule;
 mod split;
 #[path = "../toy/mod.rs"]
 mod toy;

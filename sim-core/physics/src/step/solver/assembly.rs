@@ -1,13 +1,14 @@
 //! Jᵀ W J of contacts, in the packed triangle of the system.
 
-use super::contacts::{ClassOf, ContactsOf, add_turning, block_of, law_at, only};
+use super::contacts::{ClassOf, ContactsOf, add_turning, block_of, law_held, only};
+use super::hold::Hold;
 use super::turning;
 use crate::constants::contact::{Run, row, turning as more};
 use crate::each;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, MaskOf, Num};
 use crate::step::contact_rows::class_list;
 
-/// Adds Jᵀ W J of a class to `hessian`, and Jᵀ f to `rhs` if `pulls`. Writes the pieces that its contacts are on.
+/// Adds Jᵀ W J of a class to `hessian`, and Jᵀ f to `rhs` if `pulls`. Writes the pieces that its contacts are on in the model.
 #[inline(always)]
 pub(super) fn assemble<C: Cx, const TURNS: bool>(
     cx: &mut C,
@@ -16,18 +17,21 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
     hessian: &mut [C::V],
     rhs: &mut [C::V],
     pulls: bool,
+    hold: Option<Hold<C>>,
 ) {
     let class: &ClassOf<C> = &t.classes[k];
     let list = class_list(cx, t, k);
     if let Some(block) = block_of::<_, TURNS>(class) {
         each!(cx, r in list, {
-            assemble_turning(cx, t, (class, block), r, hessian, rhs, pulls);
+            let holds = hold.map(|hold| hold.of_contact(cx, t, r));
+            assemble_turning(cx, t, (class, block), r, (hessian, rhs), pulls, holds);
         });
         return;
     }
     each!(cx, r in list, {
         let jar = cx.load3(t.memory.rows, r, row::JAR);
-        let law = law_at(cx, t, r, jar);
+        let holds = hold.map(|hold| hold.of_contact(cx, t, r));
+        let law = law_held(cx, t, r, jar, holds);
         cx.fill(t.memory.rows, r, row::STATE, law.state);
         // in worlds without this contact, J too is -0: W J is 0 there
         let mut stiffness = law.stiffness;
@@ -132,13 +136,13 @@ fn assemble_turning<C: Cx>(
     t: &ContactsOf<C>,
     (class, block): (&ClassOf<C>, usize),
     r: C::I,
-    hessian: &mut [C::V],
-    rhs: &mut [C::V],
+    (hessian, rhs): (&mut [C::V], &mut [C::V]),
     pulls: bool,
+    holds: Option<MaskOf<C>>,
 ) {
     let rows = t.memory.rows;
     let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-    let law = turning::law_at(cx, t, r, block, jar);
+    let law = turning::law_at(cx, t, r, block, jar, holds);
     cx.fill(rows, r, row::STATE, law.state);
     if pulls {
         add_turning(cx, t, class, block, r, law.force, rhs);

@@ -33,14 +33,13 @@ pub(super) fn is_curved<F: Num>(cone: Cone, state: F) -> F {
     }
 }
 
-/// The law of an elliptic cone.
+/// The law of an elliptic cone. Where it `holds`, a contact that slides has the sticking piece.
 #[inline(always)]
 pub(super) fn elliptic<F: Num>(
     impratio: F::Real,
     jar: [F; 3],
-    stiff: F,
-    soft: F,
-    mu: F,
+    [stiff, soft, mu]: [F; 3],
+    holds: Option<F::Mask>,
 ) -> ConeLaw<F> {
     let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
     let ratio = impratio.to_f64();
@@ -51,7 +50,10 @@ pub(super) fn elliptic<F: Num>(
     let (x, y) = (jar[1] * inverse, jar[2] * inverse);
     let excess = mu.fnma(slip, jar[0]);
     let leaves = !excess.lt(zero);
-    let sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
+    let mut sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
+    if let Some(holds) = holds {
+        sticks = sticks | holds;
+    }
     let acts = !leaves & zero.lt(stiff);
     let sticks = acts & sticks;
     let slides = acts & !sticks;

@@ -10,7 +10,7 @@ use super::turning;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{Class, Contacts, row, turning as more};
 use crate::each;
-use crate::lane::{Cx, MaskOf, Num};
+use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::step::contact_rows::class_list;
 
 /// Values in the active worlds, 0 elsewhere.
@@ -39,12 +39,24 @@ pub(super) fn law_at<C: Cx>(
     r: C::I,
     jar: [C::F; 3],
 ) -> ConeLaw<C::F> {
+    law_held(cx, t, r, jar, None)
+}
+
+/// The law of a contact in the model of an iteration: that of [`law_at`], or the sticking piece where it `holds` a contact that slides.
+#[inline(always)]
+pub(super) fn law_held<C: Cx>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    r: C::I,
+    jar: [C::F; 3],
+    holds: Option<MaskOf<C>>,
+) -> ConeLaw<C::F> {
     let stiff = cx.load(t.memory.rows, r, row::STIFFNESS);
     let mu = cx.load(t.memory.rows, r, row::MU);
     match t.cone {
         Cone::Elliptic => {
             let soft = cx.load(t.memory.rows, r, row::SOFT);
-            elliptic(t.impratio, jar, stiff, soft, mu)
+            elliptic(t.impratio, jar, [stiff, soft, mu], holds)
         }
         Cone::Pyramidal => pyramidal(jar, stiff, mu),
     }
@@ -78,7 +90,7 @@ fn law_along<C: Cx, const TURNS: bool>(
         for i in 0..6 {
             there[i] = alpha.fma(jv[i], jar[i]);
         }
-        let law = turning::law_at(cx, t, r, block, there);
+        let law = turning::law_at(cx, t, r, block, there, None);
         return LineLaw {
             power: turning::dot(law.force, jv),
             bend: turning::dot(law.times(jv), jv),
@@ -221,7 +233,7 @@ pub(super) fn changes<C: Cx, const TURNS: bool>(
                 }
                 Some(block) => {
                     let ahead = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
-                    turning::law_at(cx, t, r, block, ahead).state
+                    turning::law_at(cx, t, r, block, ahead, None).state
                 }
             };
             let slides = is_curved(t.cone, after);
@@ -242,7 +254,7 @@ pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, jo
         each!(cx, r in list, {
             if let Some(block) = block_of::<_, TURNS>(class) {
                 let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-                let law = turning::law_at(cx, t, r, block, jar);
+                let law = turning::law_at(cx, t, r, block, jar, None);
                 let force = only(cx, law.force);
                 let [a, b, c, d, e, f] = force;
                 cx.fill_all(t.memory.rows, r, row::FORCE, [a, b, c]);
@@ -282,7 +294,7 @@ pub(super) fn cost<C: Cx, const TURNS: bool>(
                 }
                 Some(block) => {
                     let jar = turning::six(cx, t, r, place, block + second(place));
-                    turning::law_at(cx, t, r, block, jar).cost
+                    turning::law_at(cx, t, r, block, jar, None).cost
                 }
             };
             let more = cx.get(sum) + cx.only(cost);
@@ -291,35 +303,72 @@ pub(super) fn cost<C: Cx, const TURNS: bool>(
     }
 }
 
-/// Replaces `AHEAD`, the residual at the end of a step, by its change jv. Adds Σ W jv² to `descent` and
-/// Σ W (|J a| + |aref|)² to `terms`: a force is stiffness times a small difference of J a and aref, so it has their rounding.
+/// What contacts add up to at the start of a line.
+pub(super) struct LineStart<C: Cx> {
+    /// Σ W jv².
+    pub descent: C::V,
+    /// Σ W (|J a| + |aref|)²: a force is stiffness times a small difference of J a and aref, so it has their rounding.
+    pub terms: C::V,
+    /// Σ (f of the model - f) jv: what the slope is more than the model's.
+    pub more: C::V,
+    /// Contacts that are held.
+    pub held: C::V,
+}
+
+impl<C: Cx> LineStart<C> {
+    /// Adds the law of a contact that may be held, by its power along the line, and its state.
+    #[inline(always)]
+    fn add_held(&mut self, cx: &mut C, model: [C::F; 2], here: [C::F; 2]) {
+        let more = cx.get(&self.more) + cx.only(model[0] - here[0]);
+        cx.put(&mut self.more, more);
+        let held = cx.get(&self.held) + cx.only((model[1] - here[1]).abs());
+        cx.put(&mut self.held, held);
+    }
+}
+
+/// The worlds in which the model of this iteration has a contact on its sticking piece; none where no contact is held.
+#[inline(always)]
+fn sticking<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I) -> Option<MaskOf<C>> {
+    if <<C::F as Num>::Real as Real>::DOUBLE || t.cone != Cone::Elliptic {
+        return None;
+    }
+    let off = (cx.load(t.memory.rows, r, row::STATE) - C::F::c(1.0)).abs();
+    Some(off.lt(C::F::c(0.5)))
+}
+
+/// Replaces `AHEAD`, the residual at the end of a step, by its change jv, and adds up the contacts.
 #[inline(always)]
 pub(super) fn begin_line<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
-    descent: &mut C::V,
-    terms: &mut C::V,
+    start: &mut LineStart<C>,
 ) {
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         if let Some(block) = block_of::<_, TURNS>(&t.classes[k]) {
             each!(cx, r in list, {
-                begin_turning_line(cx, t, block, r, descent, terms);
+                begin_turning_line(cx, t, block, r, start);
             });
             continue;
         }
         each!(cx, r in list, {
             let (jar, ahead) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
-            let law = law_at(cx, t, r, jar);
+            let holds = sticking(cx, t, r);
+            let law = law_held(cx, t, r, jar, holds);
             let mut jv = [C::F::c(0.0); 3];
             for i in 0..3 {
                 jv[i] = cx.only(ahead[i] - jar[i]);
             }
             cx.fill_all(t.memory.rows, r, row::AHEAD, jv);
-            let bend = bend_along(&law, jv);
-            let more = cx.get(descent) + cx.only(bend);
-            cx.put(descent, more);
-            cx.fill_all(t.memory.rows, r, row::POWER, [power(&law.force, jv), bend]);
+            let (power_here, bend) = (power(&law.force, jv), bend_along(&law, jv));
+            let more = cx.get(&start.descent) + cx.only(bend);
+            cx.put(&mut start.descent, more);
+            cx.fill_all(t.memory.rows, r, row::POWER, [power_here, bend]);
+            if holds.is_some() {
+                let here = law_at(cx, t, r, jar);
+                let power = power(&here.force, jv);
+                start.add_held(cx, [power_here, law.state], [power, here.state]);
+            }
             // the slip at any α is the root of a quadratic: keep its coefficients
             if t.cone == Cone::Elliptic {
                 let [[_, x, y], [_, u, v]] = [jar, jv];
@@ -334,8 +383,8 @@ pub(super) fn begin_line<C: Cx, const TURNS: bool>(
                 let rounded = (jar[i] + aref[i]).abs() + aref[i].abs();
                 sum = (stiff * rounded).fma(rounded, sum);
             }
-            let more = cx.get(terms) + cx.only(sum);
-            cx.put(terms, more);
+            let more = cx.get(&start.terms) + cx.only(sum);
+            cx.put(&mut start.terms, more);
         });
     }
 }
@@ -347,13 +396,13 @@ fn begin_turning_line<C: Cx>(
     t: &ContactsOf<C>,
     block: usize,
     r: C::I,
-    descent: &mut C::V,
-    terms: &mut C::V,
+    start: &mut LineStart<C>,
 ) {
     let rows = t.memory.rows;
     let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
     let ahead = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
-    let law = turning::law_at(cx, t, r, block, jar);
+    let holds = sticking(cx, t, r);
+    let law = turning::law_at(cx, t, r, block, jar, holds);
     let mut jv = ahead;
     for i in 0..6 {
         jv[i] = cx.only(ahead[i] - jar[i]);
@@ -362,9 +411,15 @@ fn begin_turning_line<C: Cx>(
     cx.fill_all(rows, r, row::AHEAD, [a, b, c]);
     cx.fill_all(rows, r, block + more::AHEAD, [d, e, f]);
     let bend = turning::dot(law.times(jv), jv);
-    let sum = cx.get(descent) + cx.only(bend);
-    cx.put(descent, sum);
-    cx.fill_all(rows, r, row::POWER, [turning::dot(law.force, jv), bend]);
+    let sum = cx.get(&start.descent) + cx.only(bend);
+    cx.put(&mut start.descent, sum);
+    let power = turning::dot(law.force, jv);
+    cx.fill_all(rows, r, row::POWER, [power, bend]);
+    if holds.is_some() {
+        let here = turning::law_at(cx, t, r, block, jar, None);
+        let there = turning::dot(here.force, jv);
+        start.add_held(cx, [power, law.state], [there, here.state]);
+    }
     if t.cone == Cone::Elliptic {
         cx.fill_all(rows, r, row::SQUARES, turning::squares(jar, jv));
     }
@@ -374,8 +429,8 @@ fn begin_turning_line<C: Cx>(
         let rounded = (jar[i] + aref[i]).abs() + aref[i].abs();
         all = (stiff * rounded).fma(rounded, all);
     }
-    let sum = cx.get(terms) + cx.only(all);
-    cx.put(terms, sum);
+    let sum = cx.get(&start.terms) + cx.only(all);
+    cx.put(&mut start.terms, sum);
 }
 
 /// Adds what contacts change in slope, curvature and size of terms of a line at `alpha`, against its quadratic model.

@@ -1,7 +1,7 @@
 //! The cost along a segment, and its exact minimum.
 
 use super::super::ConstantsOf;
-use super::contacts;
+use super::contacts::{self, LineStart};
 use super::own_rows::OwnRow;
 use super::rows::{Acting, Law, bounds, dry_friction, equality, one_sided};
 use super::ties;
@@ -25,6 +25,10 @@ pub(super) struct Line<'a, F> {
     /// For a correction: ½ gᵀ H⁻¹ g of a gradient g that is only the rounding of jar in Jᵀ W jar and of τ, at most about
     /// ε² (Σ W (|J a| + |aref|)² + |τ a|). Where each iteration solves for the whole minimum: the rounding of p'.
     pub noise: F,
+    /// p'(0), which is more than the model's where contacts are held.
+    slope: F,
+    /// Contacts that are held: 0 where the model is that of Newton's method.
+    pub held: F,
     /// Has any world of the block contacts?
     touches: bool,
     acting: Acting,
@@ -108,15 +112,24 @@ impl<'a, F: Num> Line<'a, F> {
             terms,
         } = sums;
         let mut noise = size * epsilon;
+        let (mut more, mut held) = (F::c(0.0), F::c(0.0));
         if let Some(corrects) = corrects {
-            let (mut sum, mut all) = (cx.var(descent), cx.var(terms));
-            contacts::begin_line::<_, TURNS>(cx, &m.contacts, &mut sum, &mut all);
-            descent = cx.get(&sum);
-            noise = F::select(corrects, cx.get(&all) * (epsilon * epsilon), noise);
+            let mut start = LineStart {
+                descent: cx.var(descent),
+                terms: cx.var(terms),
+                more: cx.var(more),
+                held: cx.var(held),
+            };
+            contacts::begin_line::<_, TURNS>(cx, &m.contacts, &mut start);
+            descent = cx.get(&start.descent);
+            noise = F::select(corrects, cx.get(&start.terms) * (epsilon * epsilon), noise);
+            (more, held) = (cx.get(&start.more), cx.get(&start.held));
         }
         Line {
             descent,
             noise,
+            slope: more - descent,
+            held,
             touches: corrects.is_some(),
             acting,
             params,
@@ -231,8 +244,10 @@ const SLACK: f64 = 0.1;
 /// An α beyond any minimum [–].
 const FAR: f64 = 1e10;
 
-/// The exact minimum on the segment or beyond it, p'(α) = 0: by Newton's method while its moves halve, otherwise by the chord
-/// of the bracket, with half the slope of an end that stays (Illinois method; Dowell and Jarratt 1971).
+/// The exact minimum on the segment or beyond it, p'(α) = 0, or 0 where the cost rises.
+///
+/// It goes by Newton's method while its moves halve. Otherwise it takes the chord of the bracket, with half the slope of an end
+/// that stays (Illinois method; Dowell and Jarratt 1971).
 #[inline(always)]
 pub(super) fn search<C: Cx, const TURNS: bool>(
     cx: &mut C,
@@ -249,12 +264,15 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         SLACK
     };
     let mut low = cx.var(zero);
-    let mut low_slope = cx.var(-line.descent);
+    let mut low_slope = cx.var(line.slope);
     let mut high = cx.var(C::F::c(FAR));
     let mut high_slope = cx.var(one);
     // -1 after a point below the minimum, 1 after one above it
     let mut side = cx.var(zero);
     let mut last_move = cx.var(one);
+    let climbs = !line.slope.lt(zero);
+    let start = C::F::select(climbs, zero, cx.get(length));
+    cx.set(length, start);
     times!(cx, m.solver.ls_iterations, {
         cx.tally(counts.0, counts.1);
         let alpha = cx.get(length);
@@ -262,8 +280,8 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         let falls = d.slope.lt(zero);
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);
-        let close = (d.size * resolution).max(line.descent * C::F::c(slack));
-        let found = !close.lt(d.slope.abs());
+        let close = (d.size * resolution).max(-line.slope * C::F::c(slack));
+        let found = climbs | !close.lt(d.slope.abs());
         break_if!(cx, found | (above - below).lt(above * resolution));
         cx.set(&mut low, below);
         cx.set(&mut high, above);

@@ -1,5 +1,6 @@
 //! The linear system of an iteration, H x = rhs, with the terms of contacts.
 
+use super::hold::Hold;
 use super::{assembly, contacts, gather};
 use crate::constants::Constants;
 use crate::lane::{Cx, MaskOf, Num, Real};
@@ -8,10 +9,9 @@ use crate::step::{BlockOf, ConstantsOf};
 use crate::when;
 
 /// What is solved for. It takes the place of its right-hand side.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Unknown {
-    /// The minimum of the model, in `minimum`; contact forces are added to the right-hand side.
-    Minimum,
+pub(super) enum Unknown<C: Cx> {
+    /// The minimum of the model, in which some contacts are held, in `minimum`; contact forces are added to the right-hand side.
+    Minimum(Option<Hold<C>>),
     /// A correction of accelerations, in `missing`.
     Missing,
 }
@@ -43,15 +43,15 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
-    x: Unknown,
+    x: Unknown<C>,
     touching: Option<MaskOf<C>>,
     coupling: Option<MaskOf<C>>,
 ) -> C::F {
     let t = &m.contacts;
     let w = &mut b.work;
-    let (vector, pulls) = match x {
-        Unknown::Minimum => (&mut w.minimum, true),
-        Unknown::Missing => (&mut w.missing, false),
+    let (vector, pulls, hold) = match x {
+        Unknown::Minimum(hold) => (&mut w.minimum, true, hold),
+        Unknown::Missing => (&mut w.missing, false, None),
     };
     let touches = touching.is_some();
     if touches {
@@ -88,7 +88,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
         if touches {
             let cells = cx.cells(matrix, system);
             for k in (0..t.classes.len()).filter(|&k| t.classes[k].couples == larger) {
-                assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls);
+                assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls, hold);
             }
         }
         if let (true, Some(some)) = (solves_both, coupling) {

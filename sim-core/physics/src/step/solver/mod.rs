@@ -56,12 +56,14 @@
 //! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `line` | the line search |
 //! | `own_rows` | its rows of joints, where several lanes share a world |
+//! | `hold` | contacts that slide, and are assumed to stick |
 //! | `progress` | which worlds search, and which have arrived |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
 
 mod assembly;
 mod cones;
 mod contacts;
+mod hold;
 mod line;
 mod linear;
 mod own_rows;
@@ -82,6 +84,7 @@ use crate::constants::ties::TieLaw;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{multiply, solve as solve_linear};
 use crate::{break_if, times, when};
+use hold::Hold;
 use line::{Line, search};
 use own_rows::own_rows;
 use progress::{Found, Pieces, Plan, Progress};
@@ -151,7 +154,8 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
         model_cost::<C, TURNS>(cx, m, b, acting, corrects, spread);
         // its minimum a⁺, what bodies that touch gain by going there, and how much stiffer than M it is
-        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling, spread);
+        let hold = progress.hold(cx, m);
+        let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling, spread, hold);
         // rows that are on another piece of their cost at a⁺
         let pieces = Pieces::compare::<TURNS>(cx, m, b, acting, corrects);
         // the worlds that search the segment from a to a⁺
@@ -233,15 +237,16 @@ fn minimize_model<C: Cx, const TURNS: bool>(
     corrects: Option<MaskOf<C>>,
     coupling: Option<MaskOf<C>>,
     spread: Option<&Spread<C::F>>,
+    hold: Option<Hold<C>>,
 ) -> (C::F, C::F) {
     let stiffening = match spread {
         None => {
-            let unknown = linear::Unknown::Minimum;
+            let unknown = linear::Unknown::Minimum(hold);
             linear::solve_system::<_, TURNS>(cx, m, b, unknown, corrects, coupling)
         }
         Some(spread) => {
             let w = &mut b.work;
-            spread.solve(cx, m, &w.hessian, &mut w.minimum, &mut b.pull, true)
+            spread.solve(cx, m, &w.hessian, &mut w.minimum, &mut b.pull, hold)
         }
     };
     let gain = match corrects {

@@ -1,5 +1,6 @@
 //! Progress of Newton's method: which worlds search the segment, and which have arrived.
 
+use super::hold::Hold;
 use super::line::Line;
 use super::rows::{Acting, Jacobian, changes, residual};
 use super::{UNKNOWN, contacts};
@@ -17,6 +18,8 @@ pub(super) struct Progress<C: Cx> {
     iteration: C::V,
     /// Gain of the last search [J/s²].
     last_gain: C::V,
+    /// Was the last step searched, and taken?
+    searched: C::V,
 }
 
 /// Rows between a and a⁺.
@@ -51,6 +54,10 @@ const STALLED: f64 = 0.25;
 /// A gain that does not shrink counts as noise up to this many times [`Line::noise`] [–]. In 327 states of random piles, both
 /// cones, accelerations are then off by at most 3e-4 in `f32`; with 10,000 times by 2e-3.
 const DOUBTED: f64 = 100.0;
+/// Of the tolerance, how much the next step of Newton's method may be expected to gain where it is not taken [–]. The expectation
+/// fails where a contact is about to change its piece. Of 65,000 solves of a quadruped that puts down its feet, two were off with 1,
+/// one by 15 rad/s² in a joint; none with 0.1.
+const EXPECTED: f64 = 0.01;
 
 /// An impratio above which the edges of pyramids may be too stiff for whole steps [–]. RL libraries have 1 to 10, where whole
 /// steps end sooner; at 1000 they go back and forth between pieces.
@@ -118,7 +125,18 @@ impl<C: Cx> Progress<C> {
             busy: cx.var(C::F::select(acts, one, zero)),
             iteration: cx.var(zero),
             last_gain: cx.var(C::F::c(2.0 * UNKNOWN)),
+            searched: cx.var(zero),
         }
+    }
+
+    /// Which contacts the next model holds: none in the last iteration, whose step may not be taken then.
+    #[inline(always)]
+    pub fn hold(&self, cx: &mut C, m: &ConstantsOf<C>) -> Option<Hold<C>> {
+        let half = C::F::c(0.5);
+        let iteration = cx.get(&self.iteration);
+        let is_last = C::F::c(m.solver.iterations as f64 - 1.5).lt(iteration);
+        let searched = half.lt(cx.get(&self.searched));
+        Hold::new(m, iteration.lt(half) & !is_last, searched & !is_last)
     }
 
     /// Whole step or search: the whole step is exact where no row changes its piece.
@@ -166,8 +184,9 @@ impl<C: Cx> Progress<C> {
     /// Whether a search settles the world.
     ///
     /// The model predicts a gain of ½ |p'(0)|. Below the tolerance the step is not taken, except the first (as in MuJoCo). Below
-    /// the rounding of the gain it is the last step. In `f32` it is also the last where the gain of the next step would be below
-    /// the tolerance: gains of Newton's method shrink with the square.
+    /// the rounding of the gain it is the last step. In `f32` it is also the last where the gain of the next step would be far below
+    /// the tolerance: gains of Newton's method shrink with the square. Where contacts are held, the gain is another model's, and
+    /// settles nothing.
     #[inline(always)]
     pub fn judge(
         &mut self,
@@ -181,7 +200,8 @@ impl<C: Cx> Progress<C> {
         let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
         let tolerance = C::F::k(m.solver.tolerance);
         let gain = half * line.descent;
-        let small = plan.later & gain.lt(tolerance);
+        let is_newtons_model = line.held.lt(half);
+        let small = is_newtons_model & plan.later & gain.lt(tolerance);
         let mut last = gain.lt(line.noise);
         if let Some(corrects) = corrects {
             let before = cx.get(&self.last_gain);
@@ -191,13 +211,15 @@ impl<C: Cx> Progress<C> {
             let mut ends = stalls & is_small;
             if !<<C::F as Num>::Real as Real>::DOUBLE {
                 let next = gain * gain;
-                let is_enough = next.lt(tolerance * before);
+                let is_enough = next.lt(tolerance * C::F::c(EXPECTED) * before);
                 let off = (cx.get(&found.length) - one).abs();
                 let is_newtons = off.lt(C::F::c(0.25)) & before.lt(C::F::c(UNKNOWN));
                 ends = ends | (is_enough & is_newtons);
             }
-            last = last | (corrects & ends);
-            cx.set(&mut self.last_gain, gain);
+            last = is_newtons_model & (last | (corrects & ends));
+            let unknown = C::F::c(2.0 * UNKNOWN);
+            let known = C::F::select(is_newtons_model, gain, unknown);
+            cx.set(&mut self.last_gain, known);
         }
         cx.set(&mut found.settled, C::F::select(small | last, one, zero));
         let alpha = cx.get(&found.length);
@@ -222,6 +244,8 @@ impl<C: Cx> Progress<C> {
             cx.set(&mut self.calm, C::F::select(again, zero, one));
         }
         cx.set(&mut self.busy, C::F::select(done, zero, one));
+        let moves = plan.searches & zero.lt(cx.get(&found.length));
+        cx.set(&mut self.searched, C::F::select(moves, one, zero));
         done
     }
 

@@ -4,7 +4,8 @@
 //! a lane is entry (i, g n + l). Contacts add to all columns at once, so no sum runs over lanes. The factor eliminates from the last
 //! dof to the first, as [`crate::math::factor`] does: each lane gets the eliminated column from its owner, and updates its own.
 
-use super::contacts::{ContactsOf, law_at};
+use super::contacts::{ContactsOf, law_held};
+use super::hold::Hold;
 use crate::constants::Constants;
 use crate::constants::contact::row;
 use crate::each;
@@ -83,8 +84,8 @@ impl<F: Num> Spread<F> {
         }
     }
 
-    /// Solves (M + `joints` + Jᵀ W J) x = `vector`, plus Jᵀ f in `vector` if it `pulls`, with sums over contacts. Leaves the right-hand
-    /// side in `pull`, the solution in `vector`. Returns the largest ratio of diagonal entries of the matrix and M.
+    /// Solves (M + `joints` + Jᵀ W J) x = `vector` + Jᵀ f, with sums over contacts, held as `hold` says. Leaves the right-hand side in
+    /// `pull`, the solution in `vector`. Returns the largest ratio of diagonal entries of the matrix and M.
     ///
     /// `joints` is packed as the mass matrix.
     pub fn solve<C: Cx<F = F>>(
@@ -94,7 +95,7 @@ impl<F: Num> Spread<F> {
         joints: &[F],
         vector: &mut [F],
         pull: &mut [C::V],
-        pulls: bool,
+        hold: Option<Hold<C>>,
     ) -> F {
         let (size, groups, lanes) = (self.size, self.groups, self.lanes);
         let entry = |i: usize, j: usize| m.pattern.find(i, j).map_or(F::c(0.0), |at| joints[at]);
@@ -112,7 +113,7 @@ impl<F: Num> Spread<F> {
             sides.push(cx.var(side));
         }
         for class in 0..m.contacts.classes.len() {
-            self.add_class(cx, &m.contacts, class, &mut cells, &mut sides, pulls);
+            self.add_class(cx, &m.contacts, class, &mut cells, &mut sides, hold);
         }
         let mut matrix: Vec<F> = cells.iter().map(|cell| cx.get(cell)).collect();
         let mut side: Vec<F> = sides.iter().map(|cell| cx.get(cell)).collect();
@@ -133,13 +134,14 @@ impl<F: Num> Spread<F> {
         k: usize,
         cells: &mut [C::V],
         sides: &mut [C::V],
-        pulls: bool,
+        hold: Option<Hold<C>>,
     ) {
         let (class, rows) = (&t.classes[k], t.memory.rows);
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             let jar = cx.load3(rows, r, row::JAR);
-            let law = law_at(cx, t, r, jar);
+            let holds = hold.map(|hold| hold.of_contact(cx, t, r));
+            let law = law_held(cx, t, r, jar, holds);
             cx.fill(rows, r, row::STATE, law.state);
             cx.fill_all(rows, r, WEIGHT, law.stiffness);
             cx.fill_all(rows, r, PULL, law.force);
@@ -180,13 +182,11 @@ impl<F: Num> Spread<F> {
                     product[i] = weight[i][0].fma(own[0], along);
                 }
                 stiff[group] = Some(product);
-                if pulls {
-                    let mut sum = cx.get(&sides[group]);
-                    for (x, f) in own.into_iter().zip(force) {
-                        sum = x.fma(f, sum);
-                    }
-                    cx.put(&mut sides[group], sum);
+                let mut sum = cx.get(&sides[group]);
+                for (x, f) in own.into_iter().zip(force) {
+                    sum = x.fma(f, sum);
                 }
+                cx.put(&mut sides[group], sum);
             }
             for (c, column) in class.columns.iter().enumerate() {
                 let jacobian = cx.load3(rows, r, row::JACOBIAN + 3 * c);
@@ -243,7 +243,8 @@ impl<F: Num> Spread<F> {
                 lower.push(entry);
             }
             for i in 0..k {
-                let entry = cx.of_lane(matrix[i * groups + group_of_k], lane_of_k);
+                // (k, i) instead of (i, k), which waits for the column before
+                let entry = self.of_owner(cx, &matrix[k * groups..], i);
                 for (group, lower) in lower.iter().enumerate() {
                     let at = i * groups + group;
                     matrix[at] = entry.fnma(*lower, matrix[at]);

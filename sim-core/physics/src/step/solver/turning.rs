@@ -10,7 +10,7 @@
 //! The stiffness is W = (nn, cᵀ; c, diag + along d dᵀ), with the slip direction d.
 
 use crate::constants::contact::{Cone, Contacts, row, turning};
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, MaskOf, Num, Real};
 
 type ContactsOf<C> = Contacts<<<C as Cx>::F as Num>::Real>;
 
@@ -74,7 +74,7 @@ pub(super) fn six<C: Cx>(
     [a, b, c, d, e, f]
 }
 
-/// The law at a residual; `block` is where the contact's second block begins.
+/// The law at a residual; `block` is where the contact's second block begins. `holds` as in [`super::cones::elliptic`].
 #[inline(always)]
 pub(super) fn law_at<C: Cx>(
     cx: &mut C,
@@ -82,13 +82,14 @@ pub(super) fn law_at<C: Cx>(
     r: C::I,
     block: usize,
     jar: [C::F; 6],
+    holds: Option<MaskOf<C>>,
 ) -> TurningLaw<C::F> {
     let stiff = cx.load(t.memory.rows, r, row::STIFFNESS);
     let mu = cx.load(t.memory.rows, r, row::MU);
     match t.cone {
         Cone::Elliptic => {
             let soft = cx.load(t.memory.rows, r, row::SOFT);
-            elliptic(t.impratio, jar, stiff, soft, mu)
+            elliptic(t.impratio, jar, [stiff, soft, mu], holds)
         }
         Cone::Pyramidal => {
             let exists = cx.load3(t.memory.rows, r, block + turning::EXISTS);
@@ -120,7 +121,12 @@ pub(super) fn dot<F: Num>(u: [F; 6], v: [F; 6]) -> F {
 }
 
 #[inline(always)]
-fn elliptic<F: Num>(impratio: F::Real, jar: [F; 6], stiff: F, soft: F, mu: F) -> TurningLaw<F> {
+fn elliptic<F: Num>(
+    impratio: F::Real,
+    jar: [F; 6],
+    [stiff, soft, mu]: [F; 3],
+    holds: Option<F::Mask>,
+) -> TurningLaw<F> {
     let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
     let ratio = impratio.to_f64();
     let [square, ..] = squares(jar, jar);
@@ -128,7 +134,10 @@ fn elliptic<F: Num>(impratio: F::Real, jar: [F; 6], stiff: F, soft: F, mu: F) ->
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
     let excess = mu.fnma(slip, jar[0]);
     let leaves = !excess.lt(zero);
-    let sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
+    let mut sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
+    if let Some(holds) = holds {
+        sticks = sticks | holds;
+    }
     let acts = !leaves & zero.lt(stiff);
     let (sticks, slides) = (acts & sticks, acts & !sticks);
     let by_piece = |stick, slide| F::select(sticks, stick, F::select(slides, slide, zero));
