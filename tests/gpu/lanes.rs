@@ -5,6 +5,7 @@
 use crate::common::{Run, noise};
 use crate::{assert_alive, gpu, options};
 use sim_engine::backend::Values;
+use sim_engine::options::Cuts;
 use sim_engine::simulation::{Device, Options};
 use sim_model::{Body, Collision, Description, Model, Pose, Robot, Shape, UrdfOptions};
 use sim_physics::arrays::Field;
@@ -43,9 +44,20 @@ fn scene() -> Arc<Model> {
 
 /// World k of a run starts as number `ids[k]`.
 fn played(device: Device, threads: Option<usize>, ids: &[usize], frames: usize) -> Run {
+    played_with(device, threads, Cuts::default(), ids, frames)
+}
+
+fn played_with(
+    device: Device,
+    threads: Option<usize>,
+    cuts: Cuts,
+    ids: &[usize],
+    frames: usize,
+) -> Run {
     let model = scene();
     let options = Options {
         world_threads: threads,
+        cuts,
         ..options(device, ids.len(), &FIELDS)
     };
     let mut run = Run::new(&model, options);
@@ -103,4 +115,27 @@ fn a_world_of_several_threads_has_the_same_bits_among_any_number() {
         assert_eq!(bits(&some, k), bits(&all, *id), "world {id}");
     }
     assert_ne!(state(&all, 0), state(&all, 1));
+}
+
+#[test]
+fn the_last_kernel_of_a_substep_and_the_first_of_the_next_are_one_dispatch() {
+    let cuts = Cuts {
+        kernel: Some(4000),
+        dispatch: Some(0),
+    };
+    let ids: Vec<usize> = (0..40).collect();
+    let joined = played_with(gpu(), Some(8), cuts, &ids, 12);
+    let of_steps = joined.sim.programs().iter().filter_map(|p| p.dispatches);
+    let dispatches: Vec<usize> = of_steps.collect();
+    // of 4 substeps: the first kernel, those between, the last one, and the joined one
+    let (middle, ends) = dispatches.split_at(dispatches.len() - 2);
+    assert_eq!(ends, [1, 3], "{dispatches:?}");
+    assert_eq!(middle[0], 1, "{dispatches:?}");
+    assert!(middle[1..].iter().all(|n| *n == 4), "{dispatches:?}");
+    let apart = played(gpu(), Some(8), &ids, 12);
+    for world in ids {
+        let both = state(&joined, world).into_iter().zip(state(&apart, world));
+        let worst = both.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+        assert!(worst < 1e-4, "world {world}: {worst:e}");
+    }
 }

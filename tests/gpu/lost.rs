@@ -1,9 +1,9 @@
 //! A device that is lost, one whose memory does not hold the worlds, one that does not start; and what `auto` does then.
 
 use crate::common::{Demo, Run, command, lesson, lesson_with_table};
-use crate::{assert_alive, gpu, options, run};
+use crate::{gpu, options, run};
 use sim_engine::backend::BackendError;
-use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, compiling, lose_after};
+use sim_engine::options::{AUTO_WORLDS, adapters, compiling, lose_after};
 use sim_engine::simulation::{Device, Options, Precision, Simulation};
 use sim_physics::arrays::{Field, status};
 use std::time::Duration;
@@ -179,22 +179,4 @@ fn auto_falls_back_to_the_processor_where_the_gpu_does_not_start_and_says_why() 
         assert!(here.arena == there.arena, "{why}");
     }
     compiled();
-}
-
-#[test]
-fn auto_takes_a_gpu_that_starts_and_software_only_where_it_may() {
-    let model = lesson(Demo::Target).compile().unwrap();
-    let mut run = Run::new(&model, auto(true, &[Field::JointQ]));
-    assert!(run.sim.device().starts_with("gpu"));
-    let note = run.sim.device_note().expect("auto tells").to_owned();
-    assert!(note.starts_with("the GPU `"), "{note}");
-    run.step();
-    assert_alive(&run);
-    let is_software = |info: &sim_engine::options::AdapterInfo| info.kind == AdapterKind::Software;
-    if adapters().iter().all(is_software) {
-        let run = Run::new(&model, auto(false, &[Field::JointQ]));
-        assert!(run.sim.device().starts_with("cpu"));
-        let note = run.sim.device_note().expect("auto tells");
-        assert!(note.contains("no GPU was found"), "{note}");
-    }
 }

@@ -1,16 +1,20 @@
 //! Worlds on a GPU. An adapter is required; the software driver of Debian's mesa-vulkan-drivers will do.
 
 mod agreement;
+mod auto;
 mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
+#[path = "../common/imported_memory.rs"]
+mod imported_memory;
 mod lanes;
 #[path = "../../sim-core/device/tests/device/layer.rs"]
 mod layer;
 mod lost;
 mod programs;
 mod same_bits;
+mod sharing;
 mod stages;
 mod uploads;
 

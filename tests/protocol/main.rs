@@ -3,7 +3,10 @@
 #[path = "../daemon/mod.rs"]
 mod daemon;
 mod halves;
+#[path = "../common/imported_memory.rs"]
+mod imported_memory;
 mod mistakes;
+mod on_device;
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};

@@ -41,6 +41,12 @@ pub enum DeviceError {
         /// The driver's message.
         reason: String,
     },
+    /// The driver does not export memory or semaphores to other processes.
+    #[error("device memory cannot be shared with another process: {reason}")]
+    Export {
+        /// What is missing.
+        reason: String,
+    },
     /// A program is wrong, or needs more than the adapter has.
     #[error("program `{label}` does not compile: {reason}")]
     Compile {

@@ -57,6 +57,7 @@ mod portable;
 mod program;
 mod raw_op;
 mod run;
+mod shared;
 mod software;
 mod source;
 mod spirv;
@@ -75,6 +76,7 @@ pub use memory::{Buffer, Read, Staging, Write};
 pub use module::translated;
 pub use program::Program;
 pub use run::lose_after;
+pub use shared::{Descriptor, Moment, SharedBuffer, Timeline};
 pub use software::leave;
 pub use source::Source;
 #[doc(hidden)]

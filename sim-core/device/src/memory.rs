@@ -239,7 +239,7 @@ impl Device {
         Ok(self.named("imported", bytes, wgpu, Some(raw), None))
     }
 
-    fn named(
+    pub(crate) fn named(
         &self,
         label: &str,
         bytes: u64,

@@ -5,6 +5,7 @@ use crate::batch_op::Staged;
 use crate::device::{Device, Inner};
 use crate::encode;
 use crate::error::DeviceError;
+use crate::shared::Moment;
 use crate::staging;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -26,6 +27,18 @@ impl Device {
     ///
     /// Errors: `DeviceError::Busy` if a view of one of their staging buffers is held; `DeviceError::Lost`.
     pub fn run(&self, batches: &[&Batch]) -> Result<(), DeviceError> {
+        self.run_between(batches, None, None)
+    }
+
+    /// As `run`, of memory that another process uses too: begins when a timeline has the value `after`, and advances one to `done`.
+    ///
+    /// The other process must have ordered its value before: the call waits for it without a limit.
+    pub fn run_between(
+        &self,
+        batches: &[&Batch],
+        after: Option<Moment<'_>>,
+        done: Option<Moment<'_>>,
+    ) -> Result<(), DeviceError> {
         let inner = &self.inner;
         inner.alive()?;
         match RUNS_LEFT.get() {
@@ -35,6 +48,9 @@ impl Device {
         }
         for batch in batches {
             assert!(Arc::ptr_eq(&batch.device, inner), "a batch of this device");
+        }
+        for (timeline, _) in after.iter().chain(&done) {
+            assert!(timeline.is_of(inner), "a timeline of this device");
         }
         let staged_buffers = distinct(batches);
         let mut locked = Vec::with_capacity(staged_buffers.len());
@@ -54,7 +70,7 @@ impl Device {
             for (staged, bytes) in staged_buffers.iter().zip(&locked) {
                 staging::upload(&inner.queue, &staged.memory, bytes);
             }
-            inner.submit(batches, &staged_buffers)?;
+            inner.submit(batches, &staged_buffers, [after, done])?;
             for (staged, bytes) in staged_buffers.iter().zip(&mut locked) {
                 if staged.written {
                     staging::receive(&inner.wgpu, &staged.memory, bytes)?;
@@ -75,7 +91,12 @@ impl Device {
 
 impl Inner {
     /// Submits all batches at once and waits.
-    fn submit(&self, batches: &[&Batch], staged_buffers: &[Staged]) -> Result<(), DeviceError> {
+    fn submit(
+        &self,
+        batches: &[&Batch],
+        staged_buffers: &[Staged],
+        order: [Option<Moment<'_>>; 2],
+    ) -> Result<(), DeviceError> {
         let mut buffers = Vec::new();
         let mut accepted = true;
         let mut rest = batches;
@@ -113,6 +134,10 @@ impl Inner {
                 buffers.push(encoder.finish());
             }
             _ => {}
+        }
+        if let Some(vulkan) = &self.vulkan {
+            let raw = order.map(|moment| moment.map(|(timeline, value)| (timeline.raw(), value)));
+            vulkan.order(&self.queue, raw[0], raw[1]);
         }
         let index = self.queue.submit(buffers);
         let wait = wgpu::PollType::Wait {

@@ -9,6 +9,7 @@ use crate::allocation::Residence;
 use crate::module::Module;
 use crate::raw_op::RawOp;
 use std::convert::Infallible;
+use std::time::Duration;
 use thiserror::Error;
 
 /// Has no values.
@@ -21,6 +22,20 @@ pub(crate) struct Mapped(Infallible);
 pub(crate) struct Pipeline(Infallible);
 /// Has no values.
 pub(crate) struct Recording(Infallible);
+/// Has no values.
+pub(crate) struct RawTimeline(Infallible);
+
+/// Memory as another process imports it.
+pub(crate) struct Exported {
+    pub memory: Descriptor,
+    pub bytes: u64,
+    pub dedicated: bool,
+}
+
+#[cfg(unix)]
+type Descriptor = std::os::fd::OwnedFd;
+#[cfg(not(unix))]
+type Descriptor = Infallible;
 
 /// Has no values.
 #[derive(Debug, Error)]
@@ -57,6 +72,12 @@ impl Mapped {
     }
 }
 
+impl RawTimeline {
+    pub fn wait(&self, _: u64, _: Duration) -> Result<bool, Failure> {
+        match self.0 {}
+    }
+}
+
 impl Vulkan {
     pub fn driver(&self) -> &str {
         match self.0 {}
@@ -81,6 +102,27 @@ impl Vulkan {
     /// # Safety
     /// Never called.
     pub unsafe fn import(&self, _: &wgpu::Device, _: *mut u8, _: u64) -> Result<Made, String> {
+        match self.0 {}
+    }
+
+    pub fn uuid(&self) -> [u8; 16] {
+        match self.0 {}
+    }
+
+    pub fn allocate_exported(&self, _: &wgpu::Device, _: u64) -> Result<(Made, Exported), String> {
+        match self.0 {}
+    }
+
+    pub fn timeline(&self) -> Result<(RawTimeline, Descriptor), String> {
+        match self.0 {}
+    }
+
+    pub fn order(
+        &self,
+        _: &wgpu::Queue,
+        _: Option<(&RawTimeline, u64)>,
+        _: Option<(&RawTimeline, u64)>,
+    ) {
         match self.0 {}
     }
 

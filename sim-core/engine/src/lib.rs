@@ -4,8 +4,10 @@
 //! kinematics and dynamics at states that a caller gives. The physics code is `sim_physics`, which the crates under `sim-core/stages`
 //! compile for each instruction set.
 //!
-//! Imports run one way: `random ← start ← backend ← snapshot ← options ← simulation ← checks ← params ← write ← command ← dynamics`.
+//! Imports run one way: `random ← start ← backend ← auto ← snapshot ← options ← simulation ← checks ← params ← write ← command ←
+//! dynamics`.
 
+mod auto;
 pub mod backend;
 mod checks;
 mod command;

@@ -1,5 +1,6 @@
 //! Options of a run, and the choice of its device.
 
+use crate::auto::{Question, choose};
 use crate::backend::{
     BackendError, Backends, Faults, Groups, Lanes, OutputsAt, Precision, available_memory, cpu, gpu,
 };
@@ -7,8 +8,9 @@ use crate::random::{Draws, Numbering};
 use sim_model::Model;
 use sim_physics::arrays::{Field, Layout};
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, UNIX_EPOCH};
 
+pub use crate::backend::gpu::Cuts;
 pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
 #[doc(hidden)]
 pub use sim_device::{compiling, lose_after, open_as_discrete};
@@ -26,17 +28,19 @@ pub enum Device {
         /// Where programs are kept, if anywhere.
         cache: Option<PathBuf>,
     },
-    /// A hardware GPU, if there is one, for single precision and at least [`AUTO_WORLDS`] worlds; otherwise the processor.
+    /// The faster of a hardware GPU and the processor, by a measurement at the launch, for single precision and at least
+    /// [`AUTO_WORLDS`] worlds; otherwise the processor.
     Auto {
-        /// Where programs are kept, if anywhere.
+        /// Where programs and measurements are kept, if anywhere.
         cache: Option<PathBuf>,
-        /// Whether a software driver is accepted too, for tests.
+        /// Whether a software driver takes part too, for tests.
         software: bool,
     },
 }
 
-/// Least worlds for which [`Device::Auto`] uses a GPU: fewer leave most of it idle. A guess, not measured.
-pub const AUTO_WORLDS: usize = 1024;
+/// Least worlds for which [`Device::Auto`] measures. The ends of a frame alone take a card some 120 µs (predicted, `ends_us` in
+/// benches/results/gpu_offline/predictions.csv); in this time eight cores step 150 arms through a frame (benches/NOTES.md).
+pub const AUTO_WORLDS: usize = 128;
 
 /// Limit per program. On a busy computer lavapipe takes up to 4 s for a program of a grasp, and 12 s for all of them in sequence.
 const COMPILE_LIMIT: Duration = Duration::from_secs(180);
@@ -54,6 +58,8 @@ pub struct Options {
     pub replay: Replay,
     /// Threads of a GPU that share a world where contacts can be, a power of two up to 32; none = what suits the adapter.
     pub world_threads: Option<usize>,
+    /// Where the kernels of a GPU are cut, where that differs from what suits the adapter; benchmarks vary it.
+    pub cuts: Cuts,
     /// Limit on the compile time of a GPU program; a driver that exceeds it is abandoned.
     pub compile_limit: Duration,
     /// Precision of state, commands and fields.
@@ -81,6 +87,7 @@ impl Default for Options {
             device: Device::Cpu,
             replay: Replay::Recorded,
             world_threads: None,
+            cuts: Cuts::default(),
             compile_limit: COMPILE_LIMIT,
             precision: Precision::F32,
             threads: None,
@@ -145,9 +152,15 @@ pub(crate) fn backends(
             cache: cache.as_deref(),
             replay: options.replay,
             world_threads: options.world_threads,
+            cuts: options.cuts,
             compile_limit: options.compile_limit,
         };
         gpu::create(model, groups, layout, &wanted)
+    };
+    let on_cpu = || {
+        let layout = (layout, options.outputs_at);
+        let threads = threads_of(options);
+        cpu::create(model, groups, precision, options.lanes, layout, threads)
     };
     let lags = options.outputs_at == OutputsAt::LastSubstep;
     let note = match &options.device {
@@ -169,23 +182,74 @@ pub(crate) fn backends(
             let will_do = |info: &&AdapterInfo| *software || info.kind != AdapterKind::Software;
             match found.iter().find(will_do) {
                 None => Some("the processor: no GPU was found".to_owned()),
-                Some(info) => match on_gpu(&Adapter::Index(info.index), cache) {
-                    Ok(made) => return Ok((made, Some(format!("the GPU `{}`", info.name)))),
-                    Err(e) => Some(format!("the processor: `{}` failed: {e}", info.name)),
-                },
+                Some(adapter) => {
+                    let question = Question {
+                        adapter,
+                        key: measured(model, options, count, adapter),
+                        folder: cache.as_deref(),
+                        worlds,
+                        substeps: model.substeps(),
+                        words: layout.bytes / 8,
+                    };
+                    let on_gpu = || on_gpu(&Adapter::Index(adapter.index), cache);
+                    let (made, note) = choose(&question, on_gpu, on_cpu)?;
+                    return Ok((made, Some(note)));
+                }
             }
         }
     };
-    let threads = threads_of(options);
-    let made = cpu::create(
-        model,
-        groups,
-        precision,
+    Ok((on_cpu()?, note))
+}
+
+/// All that the rates of `auto` depend on, in one line.
+fn measured(model: &Model, options: &Options, groups: usize, adapter: &AdapterInfo) -> String {
+    let (worlds, threads) = (options.worlds, threads_of(options));
+    let how = (options.replay, options.world_threads, options.cuts);
+    format!(
+        "tightloop {}, {}; {}, {}, {how:?}; {}, {threads} threads, {:?}; model {:016x}; {groups} x {worlds} worlds; {:?}",
+        env!("CARGO_PKG_VERSION"),
+        build(),
+        adapter.name,
+        adapter.driver,
+        processor(),
         options.lanes,
-        (layout, options.outputs_at),
-        threads,
-    )?;
-    Ok((made, note))
+        model.hash(),
+        options.fields,
+    )
+}
+
+/// Size and time of change of the file that has this code, as Linux has them: another build may have other kernels. To hash the kernels
+/// they would have to be recorded at every launch.
+fn build() -> String {
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    let address = build as fn() -> String as usize;
+    let has_this_code = |line: &&str| {
+        let ends = line
+            .split_once(' ')
+            .and_then(|(part, _)| part.split_once('-'));
+        let number = |digits| usize::from_str_radix(digits, 16).ok();
+        let part = ends.and_then(|(first, end)| Some(number(first)?..number(end)?));
+        part.is_some_and(|part| part.contains(&address))
+    };
+    let line = maps.lines().find(has_this_code).unwrap_or_default();
+    let file = line
+        .find('/')
+        .map(|start| std::fs::metadata(&line[start..]));
+    let Some(Ok(file)) = file else {
+        return "unknown build".to_owned();
+    };
+    let changed = file.modified().ok();
+    let changed = changed.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    let changed = changed.map_or(0, |time| time.as_nanos());
+    format!("build of {} bytes at {changed}", file.len())
+}
+
+/// Name of the processor, as Linux has it.
+fn processor() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("model name"));
+    let name = line.and_then(|line| line.split(": ").nth(1));
+    name.unwrap_or("processor").to_owned()
 }
 
 /// Requested threads; one per core by default.

@@ -7,6 +7,7 @@ pub use crate::backend::{
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
+use crate::backend::sharing::Sharing;
 use crate::backend::{Backend, BackendError};
 use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
@@ -146,6 +147,11 @@ impl Simulation {
     pub fn copied(&self) -> u64 {
         self.backend.copied()
     }
+    /// Joint positions of all worlds, `(worlds, coords)` [rad or m].
+    pub fn positions(&self) -> Vec<f64> {
+        let coords = self.model.coords();
+        snapshot::positions(&self.snapshot(), &self.head(), self.model.dofs(), coords)
+    }
     /// Lets a GPU write into this arena whenever it is stepped into; false if it cannot, and on the CPU, which always writes there.
     ///
     /// # Safety
@@ -155,9 +161,13 @@ impl Simulation {
         // SAFETY: by contract.
         unsafe { self.backend.import(arena) }
     }
-    /// Forgets all imported arenas: their memory may be unmapped.
+    /// Forgets all imported arenas, whose memory may be unmapped, and the memory of a GPU that a client maps.
     pub fn forget(&mut self) {
         self.backend.forget();
+    }
+    /// The memory of a GPU that clients can map; none on the CPU.
+    pub fn sharing(&mut self) -> Option<&mut dyn Sharing> {
+        self.backend.sharing()
     }
     /// The programs of a GPU; none on the CPU.
     pub fn programs(&self) -> &[ProgramInfo] {

@@ -158,6 +158,24 @@ pub(crate) fn write(head: &Head, bytes: &mut [u8], fill: impl FnOnce(&mut [u8]))
     bytes[12..16].copy_from_slice(&checksum.to_le_bytes());
 }
 
+/// Arrays of a record with a scalar for each dof, before the positions: velocities, accelerations and commands.
+const DOF_ARRAYS: usize = 5;
+
+/// Joint positions of all worlds of a snapshot of this head, `(worlds, coords)` [rad or m].
+pub(crate) fn positions(bytes: &[u8], head: &Head, dofs: usize, coords: usize) -> Vec<f64> {
+    let (real, first) = (head.real(), DOF_ARRAYS * dofs);
+    let records = bytes[HEAD..].chunks_exact(head.record());
+    let numbers = records.flat_map(|record| {
+        let positions = &record[COUNTERS + first * real..][..coords * real];
+        positions.chunks_exact(real)
+    });
+    let number = |bytes: &[u8]| match *bytes {
+        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+        _ => f64::from_le_bytes(std::array::from_fn(|i| bytes[i])),
+    };
+    numbers.map(number).collect()
+}
+
 /// Records of a snapshot that fits a simulation, which `here` describes, and may be restored in the worlds of the mask
 /// (none = all).
 ///

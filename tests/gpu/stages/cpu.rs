@@ -9,6 +9,44 @@ use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
 use sim_physics::step::StageId;
 
+/// Most worlds of a register.
+const LANES_MAX: usize = 16;
+
+/// Values of some worlds as registers: value k of each, for all k. A register that is not full repeats its first world.
+///
+/// This crate is compiled without optimisation, and a model has up to a hundred thousand values: so plain loops over slices.
+#[inline(always)]
+fn gather<F: Lane>(worlds: &[&[f64]], to: &mut [F]) {
+    let mut lanes = [F::Real::default(); LANES_MAX];
+    let mut k = 0;
+    while k < to.len() {
+        let mut lane = 0;
+        while lane < F::WIDTH {
+            let world = if lane < worlds.len() { lane } else { 0 };
+            lanes[lane] = F::Real::of(worlds[world][k]);
+            lane += 1;
+        }
+        to[k] = F::load(&lanes[..F::WIDTH]);
+        k += 1;
+    }
+}
+
+/// The values of registers, world by world.
+#[inline(always)]
+fn scatter<F: Lane>(from: &[F], worlds: &mut [&mut [f64]]) {
+    let mut lanes = [F::Real::default(); LANES_MAX];
+    let mut k = 0;
+    while k < from.len() {
+        from[k].store(&mut lanes[..F::WIDTH]);
+        let mut lane = 0;
+        while lane < worlds.len() {
+            worlds[lane][k] = lanes[lane].to_f64();
+            lane += 1;
+        }
+        k += 1;
+    }
+}
+
 /// Runs a stage, `F::WIDTH` worlds at a time.
 ///
 /// # Safety
@@ -22,42 +60,35 @@ unsafe fn run<F: Lane>(
 ) -> Vec<Left> {
     let mut all = Vec::new();
     for worlds in given.chunks(F::WIDTH) {
-        // a block that is not full repeats its first world
-        let number = |of: &dyn Fn(&Given) -> f64| {
-            let lanes: Vec<F::Real> = (0..F::WIDTH)
-                .map(|lane| F::Real::of(of(worlds.get(lane).unwrap_or(&worlds[0]))))
-                .collect();
-            F::load(&lanes)
-        };
         let mut block = Block::<F, F>::new(m, F::c(0.0));
-        let mut k = 0;
+        let mut first = 0;
         for array in stage.reads() {
-            for x in numbers(block.array_mut(*array)) {
-                *x = number(&|world| world.numbers[k]);
-                k += 1;
-            }
+            let to = numbers(block.array_mut(*array));
+            let of: Vec<&[f64]> = worlds.iter().map(|w| &w.numbers[first..]).collect();
+            gather(&of, to);
+            first += to.len();
         }
-        let mut memory: Vec<F> = (0..m.contacts.memory.len)
-            .map(|k| number(&|world| world.memory[k]))
-            .collect();
+        let mut memory = vec![F::c(0.0); m.contacts.memory.len];
+        let of: Vec<&[f64]> = worlds.iter().map(|world| &world.memory[..]).collect();
+        gather(&of, &mut memory);
         // SAFETY: by contract.
         unsafe { run(m, &mut block, &mut memory) };
-        let mut left: Vec<Left> = worlds.iter().map(|_| Left::default()).collect();
-        let mut lanes = vec![F::Real::default(); F::WIDTH];
+        let counts = (stage.writes().iter()).map(|array| numbers(block.array_mut(*array)).len());
+        let count = counts.sum();
+        let nothing = |_| Left {
+            numbers: vec![0.0; count],
+            memory: vec![0.0; memory.len()],
+        };
+        let mut left: Vec<Left> = worlds.iter().map(nothing).collect();
+        let mut first = 0;
         for array in stage.writes() {
-            for x in numbers(block.array_mut(*array)) {
-                x.store(&mut lanes);
-                for (world, x) in left.iter_mut().zip(&lanes) {
-                    world.numbers.push(x.to_f64());
-                }
-            }
+            let from = numbers(block.array_mut(*array));
+            let to = left.iter_mut().map(|world| &mut world.numbers[first..]);
+            scatter(from, &mut to.collect::<Vec<_>>());
+            first += from.len();
         }
-        for x in memory {
-            x.store(&mut lanes);
-            for (world, x) in left.iter_mut().zip(&lanes) {
-                world.memory.push(x.to_f64());
-            }
-        }
+        let to = left.iter_mut().map(|world| &mut world.memory[..]);
+        scatter(&memory, &mut to.collect::<Vec<_>>());
         all.extend(left);
     }
     all

@@ -6,6 +6,7 @@ use sim_physics::constants::Constants;
 use sim_physics::step::StageId;
 use sim_record::Recording;
 use sim_record::wgsl::{ProgramOptions, wgsl};
+use std::ops::Range;
 use std::time::Duration;
 
 /// Longer than any program here takes on a busy computer.
@@ -92,12 +93,8 @@ impl Gpu {
         let mut scratch = vec![0.0; self.packed(given[0].memory.len())];
         for (w, world) in given.iter().enumerate() {
             assert_eq!(world.numbers.len(), kernel.inputs);
-            for (i, x) in world.numbers.iter().enumerate() {
-                fields[self.place(i, w)] = *x as f32;
-            }
-            for (i, x) in world.memory.iter().enumerate() {
-                scratch[self.place(i, w)] = *x as f32;
-            }
+            self.pack(&world.numbers, w, &mut fields);
+            self.pack(&world.memory, w, &mut scratch);
         }
         let fields = staged(&self.device, "fields", bytemuck::cast_slice(&fields));
         let scratch = staged(&self.device, "scratch", bytemuck::cast_slice(&scratch));
@@ -119,21 +116,37 @@ impl Gpu {
         let (fields, scratch) = (fields.read(), scratch.read());
         let fields: &[f32] = bytemuck::cast_slice(&fields);
         let scratch: &[f32] = bytemuck::cast_slice(&scratch);
+        let numbers = kernel.inputs..kernel.inputs + kernel.outputs;
         (0..self.worlds)
             .map(|w| Left {
-                numbers: (kernel.inputs..kernel.inputs + kernel.outputs)
-                    .map(|i| f64::from(fields[self.place(i, w)]))
-                    .collect(),
-                memory: (0..given[w].memory.len())
-                    .map(|i| f64::from(scratch[self.place(i, w)]))
-                    .collect(),
+                numbers: self.unpack(fields, w, numbers.clone()),
+                memory: self.unpack(scratch, w, 0..given[w].memory.len()),
             })
             .collect()
     }
 
-    /// Where number i of world w lies.
-    fn place(&self, i: usize, w: usize) -> usize {
-        (i / WIDTH * self.worlds + w) * WIDTH + i % WIDTH
+    /// Puts the numbers of world w where its threads look for them: number i lies in component i % 4 of vector i / 4.
+    ///
+    /// This crate is compiled without optimisation, and there are many numbers: so a plain loop.
+    fn pack(&self, numbers: &[f64], w: usize, to: &mut [f32]) {
+        let mut i = 0;
+        while i < numbers.len() {
+            to[(i / WIDTH * self.worlds + w) * WIDTH + i % WIDTH] = numbers[i] as f32;
+            i += 1;
+        }
+    }
+
+    /// The reverse.
+    fn unpack(&self, from: &[f32], w: usize, range: Range<usize>) -> Vec<f64> {
+        let mut numbers = vec![0.0; range.len()];
+        let to: &mut [f64] = &mut numbers;
+        let mut k = 0;
+        while k < to.len() {
+            let i = range.start + k;
+            to[k] = f64::from(from[(i / WIDTH * self.worlds + w) * WIDTH + i % WIDTH]);
+            k += 1;
+        }
+        numbers
     }
 
     /// Room for so many numbers of all worlds.

@@ -95,7 +95,7 @@ impl Vulkan {
 
     /// # Safety
     /// `memory` is of a type and size for `buffer`, and mappable if `residence` is the host; it is freed on failure.
-    unsafe fn bind(
+    pub(super) unsafe fn bind(
         &self,
         buffer: vk::Buffer,
         memory: vk::DeviceMemory,
@@ -130,7 +130,7 @@ impl Vulkan {
     }
 
     /// First type among `bits` that has all `flags`.
-    fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
+    pub(super) fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
         (0..self.heaps.memory_type_count).find(|&kind| {
             bits >> kind & 1 == 1
                 && self.heaps.memory_types[kind as usize]
@@ -230,7 +230,7 @@ impl Vulkan {
     }
 }
 
-fn describe(bytes: u64) -> vk::BufferCreateInfo<'static> {
+pub(super) fn describe(bytes: u64) -> vk::BufferCreateInfo<'static> {
     vk::BufferCreateInfo::default().size(bytes).usage(
         vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::INDIRECT_BUFFER
@@ -243,7 +243,7 @@ fn describe(bytes: u64) -> vk::BufferCreateInfo<'static> {
 ///
 /// # Safety
 /// Both are of `device`, bound to one another, and owned by nobody else.
-unsafe fn wrap(
+pub(super) unsafe fn wrap(
     device: &wgpu::Device,
     buffer: vk::Buffer,
     memory: vk::DeviceMemory,

@@ -2,11 +2,14 @@
 //!
 //! wgpu opens the device, submits and waits. It tracks nothing that is recorded here.
 
+mod export;
 mod memory;
 mod pipeline;
 mod recording;
 
-pub(crate) use memory::{Handle, Mapped};
+use export::Exports;
+pub(crate) use export::RawTimeline;
+pub(crate) use memory::{Handle, Made, Mapped};
 pub(crate) use pipeline::Pipeline;
 pub(crate) use recording::Recording;
 
@@ -46,6 +49,7 @@ pub(crate) struct Vulkan {
     trusts_pipelines: bool,
     /// The driver's pipeline cache, which locks itself.
     cache: vk::PipelineCache,
+    exports: Exports,
     driver: String,
 }
 
@@ -84,6 +88,9 @@ pub(crate) fn open(
         let imports = hal
             .physical_device_capabilities()
             .supports_extension(ash::ext::external_memory_host::NAME);
+        let signals = hal
+            .physical_device_capabilities()
+            .supports_extension(ash::khr::external_semaphore_fd::NAME);
         let trusts_pipelines = trusts_pipelines(&hal);
         let mut robustness = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default()
             .pipeline_robustness(trusts_pipelines);
@@ -93,6 +100,11 @@ pub(crate) fn open(
             &wanted.required_limits,
             &wanted.memory_hints,
             Some(Box::new(move |arguments| {
+                if signals {
+                    arguments
+                        .extensions
+                        .push(ash::khr::external_semaphore_fd::NAME);
+                }
                 if imports {
                     arguments
                         .extensions
@@ -154,6 +166,7 @@ unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) 
         let known = all.properties;
         Vulkan {
             host: imports.then(|| ash::ext::external_memory_host::Device::new(&instance, &raw)),
+            exports: Exports::of(&instance, physical, &raw, hal.enabled_device_extensions()),
             host_align: host.min_imported_host_pointer_alignment.max(1),
             trusts_pipelines,
             heaps: instance.get_physical_device_memory_properties(physical),

@@ -6,5 +6,6 @@ mod layer;
 mod memory;
 mod refusals;
 mod run;
+mod shared;
 mod spirv;
 mod validation;

@@ -4,6 +4,14 @@ use sim_physics::constants::Constants;
 use sim_physics::constants::sensors::SensorKind;
 use sim_physics::lane::Real;
 
+/// Whether there are any.
+pub(super) fn are_in<R: Real>(m: &Constants<R>) -> bool {
+    let sensors = m.mujoco.sensors.all.iter();
+    sensors
+        .clone()
+        .any(|sensor| matches!(sensor.kind, SensorKind::Clock))
+}
+
 /// Writes the clocks of a world at this time [s] to its row of `sensordata`.
 pub(super) fn put<R: Real>(m: &Constants<R>, time: f64, row: &mut [R]) {
     for sensor in &m.mujoco.sensors.all {

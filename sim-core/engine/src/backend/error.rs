@@ -253,6 +253,12 @@ pub enum BackendError {
         /// Why.
         reason: String,
     },
+    /// Memory of the device cannot be given to a client.
+    #[error("{reason}")]
+    Share {
+        /// What is missing.
+        reason: String,
+    },
     /// Double precision on a GPU.
     #[error("a GPU computes in single precision; use precision = f32, or device = cpu")]
     DoubleOnGpu,
@@ -275,6 +281,7 @@ impl From<sim_device::DeviceError> for BackendError {
         match error {
             DeviceError::UnknownAdapter { .. } => BackendError::Adapter { reason },
             DeviceError::OutOfMemory { .. } => BackendError::DeviceMemory { reason },
+            DeviceError::Export { .. } => BackendError::Share { reason },
             DeviceError::CompileTimeout { .. } => BackendError::CompileTimeout { reason },
             _ => BackendError::Device { reason },
         }

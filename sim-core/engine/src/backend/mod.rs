@@ -9,6 +9,7 @@ pub mod gpu;
 mod input;
 mod noise;
 mod profile;
+pub mod sharing;
 mod state;
 
 pub use error::BackendError;
@@ -17,6 +18,7 @@ pub use input::{Input, Values};
 pub use profile::{Histogram, Profile, StageProfile};
 
 use crate::random::Numbering;
+use sharing::Sharing;
 use std::ops::Range;
 
 /// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, seed `u64`, episode `u32`,
@@ -180,6 +182,10 @@ pub trait Backend: Send {
     /// Resets the worlds of the mask (none = all): to the start of their next episode, or of the first episode of new seeds (one for
     /// all worlds, or one per world). [`crate::start::StartDraw`] draws the start.
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
+    /// Begins the run again, as if no frame had been made and nothing written; false on the CPU, where new worlds are as fast.
+    fn restart(&mut self) -> bool {
+        false
+    }
     /// The worlds that were frozen since the last call.
     fn take_frozen(&mut self) -> Frozen;
     /// Runs `substeps` substeps (none = evaluates only), then writes every field of the layout
@@ -216,8 +222,12 @@ pub trait Backend: Send {
     unsafe fn import(&mut self, _arena: &mut [u64]) -> bool {
         false
     }
-    /// Forgets all arenas that were imported.
+    /// Forgets all arenas that were imported, and the memory that a client maps.
     fn forget(&mut self) {}
+    /// The memory of a GPU that clients can map; none on the CPU.
+    fn sharing(&mut self) -> Option<&mut dyn Sharing> {
+        None
+    }
 }
 
 /// Memory that can be allocated without swapping [bytes].

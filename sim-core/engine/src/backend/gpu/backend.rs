@@ -4,9 +4,11 @@ use super::compiled::Compiled;
 use super::imported::Imported;
 use super::mirror::HostMirror;
 use super::places::Places;
+use super::shared::Shared;
 use super::tile::Tile;
 use super::uploads::{Bounds, Rows};
 use crate::backend::noise::Noise;
+use crate::backend::sharing::Sharing;
 use crate::backend::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, Input, ProgramInfo, Values,
 };
@@ -21,6 +23,8 @@ use std::sync::OnceLock;
 
 /// The backend of one group of worlds. Field order matters: batches are dropped before buffers and programs, and those before the device.
 pub(super) struct Gpu {
+    /// Memory that a client maps.
+    pub shared: Option<Shared>,
     pub tiles: Vec<Tile>,
     pub bounds: Bounds,
     pub compiled: Compiled,
@@ -57,6 +61,15 @@ impl Gpu {
         if let Err(error) = result {
             self.lost.get_or_init(|| error);
         }
+    }
+
+    /// Forgets the memory that a client maps, once the commands that wait in it are written.
+    pub(super) fn forget_shared(&mut self) {
+        if self.shared.is_some() && self.lost.get().is_none() {
+            let sent = self.flush();
+            self.check(sent);
+        }
+        self.shared = None;
     }
 
     /// Stages a command of all worlds for the next frame; false if these columns are no whole command.
@@ -179,6 +192,17 @@ impl Backend for Gpu {
         self.check(begun);
     }
 
+    fn restart(&mut self) -> bool {
+        let shape = self.shape();
+        self.mirror
+            .fill_params(&self.start[shape.start(Array::Params)..]);
+        self.reset(None, Some(&[0]));
+        self.mirror.frames = 0;
+        self.mirror.frozen = Frozen::default();
+        self.copied = 0;
+        true
+    }
+
     fn take_frozen(&mut self) -> Frozen {
         let mut all = std::mem::take(&mut self.mirror.frozen);
         if all.first.is_some() {
@@ -223,7 +247,12 @@ impl Backend for Gpu {
     }
 
     fn forget(&mut self) {
+        self.forget_shared();
         self.imported.clear();
+    }
+
+    fn sharing(&mut self) -> Option<&mut dyn Sharing> {
+        Some(self)
     }
 
     unsafe fn import(&mut self, arena: &mut [u64]) -> bool {

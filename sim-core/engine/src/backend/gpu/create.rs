@@ -17,7 +17,7 @@ use crate::backend::state::{Shape, finds_contacts, start};
 use crate::backend::{Backend, BackendError, Backends, Faults, Groups};
 use crate::random::Numbering;
 use crate::start::StartDraw;
-use sim_device::{Choice, Device, Replay};
+use sim_device::{AdapterInfo, Choice, Device, Replay};
 use sim_model::Model;
 use sim_physics::arrays::Array;
 use sim_physics::arrays::Layout;
@@ -38,6 +38,36 @@ pub(super) const HARDWARE: Limits = Limits {
     prices: Prices::HARDWARE,
 };
 
+/// Where the kernels of a GPU are cut; none = what suits the adapter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cuts {
+    /// Largest kernel [simple statements].
+    pub kernel: Option<usize>,
+    /// Price of one more dispatch [simple statements].
+    pub dispatch: Option<usize>,
+}
+
+impl Cuts {
+    /// Limits where these cuts replace what is usual.
+    pub(super) fn replace(self, usual: Limits) -> Limits {
+        Limits {
+            kernel: self.kernel.unwrap_or(usual.kernel),
+            dispatch: self.dispatch.unwrap_or(usual.dispatch),
+            ..usual
+        }
+    }
+}
+
+/// The limits of kernels with so many threads per world.
+fn limits(info: &AdapterInfo, threads: usize, cuts: Cuts) -> Limits {
+    // loops that are cut inside cannot be shared
+    let usual = match threads {
+        1 => software::limits(info).unwrap_or(HARDWARE),
+        _ => HARDWARE,
+    };
+    cuts.replace(usual)
+}
+
 /// What a caller asks of a GPU, besides a model and its worlds.
 pub struct Wanted<'a> {
     /// The adapter.
@@ -48,6 +78,8 @@ pub struct Wanted<'a> {
     pub replay: Replay,
     /// Threads that share a world; none = what suits the adapter.
     pub world_threads: Option<usize>,
+    /// Where kernels are cut.
+    pub cuts: Cuts,
     /// Limit on the compile time of a program.
     pub compile_limit: Duration,
 }
@@ -114,11 +146,7 @@ impl Gpu {
         let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
         let info = device.info();
         let how = How {
-            // loops that are cut inside cannot be shared
-            limits: match threads {
-                1 => software::limits(info).unwrap_or(HARDWARE),
-                _ => HARDWARE,
-            },
+            limits: limits(info, threads, asked.cuts),
             lanes: threads,
             exchange: workgroups::exchange(info),
         };
@@ -170,6 +198,7 @@ impl Gpu {
         }
         let shape = Shape::of(m);
         let mut gpu = Gpu {
+            shared: None,
             tiles,
             bounds,
             compiled,

@@ -123,9 +123,14 @@ impl Gpu {
         }
         let place = arena.as_ptr() as usize;
         let imported = self.imported.iter().find(|(known, _)| *known == place);
-        let shown = imported.map(|(_, imported)| &imported.shown[..]);
+        let is_staged = imported.is_none();
+        let shared = self.shared.as_ref();
+        let slot = shared.and_then(|shared| shared.slot(place));
+        let shown = shared.zip(slot).map(|(shared, slot)| shared.shows(slot));
+        let shown = shown.or(imported.map(|(_, imported)| &imported.shown[..]));
         let mut batches = Vec::with_capacity(3 * self.tiles.len());
         batches.extend(self.bounds.pending());
+        batches.extend(shared.iter().flat_map(|shared| shared.commands.pending()));
         for (k, tile) in self.tiles.iter().enumerate() {
             batches.extend(tile.pending());
             batches.push(tile.computes(steps));
@@ -134,12 +139,10 @@ impl Gpu {
         if shown.is_none() {
             batches.extend(self.tiles.iter().filter_map(Tile::copies_out));
         }
-        self.device.run(&batches)?;
-        let is_staged = shown.is_none();
+        let done = shared.and_then(|shared| shared.drawn(slot));
+        self.device.run_between(&batches, None, done)?;
         self.bounds.sent();
-        for tile in &mut self.tiles {
-            tile.sent();
-        }
+        self.commands_sent();
         if is_staged {
             let bytes = self.layout.bytes;
             words::bytes(arena)[..bytes].copy_from_slice(&self.frame.read()[..bytes]);
@@ -148,6 +151,9 @@ impl Gpu {
         self.read_counters(arena, steps);
         self.put_clocks(arena);
         self.add_noise(arena);
+        if let Some(shared) = &mut self.shared {
+            shared.finish(&self.device, slot, words::bytes(arena))?;
+        }
         if steps && self.faults.resets {
             let frozen = |world: &usize| self.mirror.status[*world] & status::FROZEN != 0;
             let again: Vec<usize> = (0..self.mirror.seeds.len()).filter(frozen).collect();
@@ -164,13 +170,24 @@ impl Gpu {
 
     /// Sends the commands that wait for a frame.
     pub(super) fn flush(&mut self) -> Result<(), BackendError> {
-        let batches: Vec<_> = self.tiles.iter().flat_map(Tile::pending).collect();
+        let shared = self.shared.iter();
+        let shared = shared.flat_map(|shared| shared.commands.pending());
+        let tiles = self.tiles.iter().flat_map(Tile::pending);
+        let batches: Vec<_> = shared.chain(tiles).collect();
         if !batches.is_empty() {
             self.device.run(&batches)?;
+        }
+        self.commands_sent();
+        Ok(())
+    }
+
+    /// All commands that waited were sent.
+    fn commands_sent(&mut self) {
+        if let Some(shared) = &mut self.shared {
+            shared.commands.sent();
         }
         for tile in &mut self.tiles {
             tile.sent();
         }
-        Ok(())
     }
 }

@@ -5,11 +5,52 @@ use super::tile::Tile;
 use super::words;
 use crate::backend::BackendError;
 use sim_device::{Batch, Buffer, Device};
+use std::ops::Range;
 
 /// Reader memory that frames are written to.
 pub(super) struct Imported {
     /// One batch per tile.
     pub shown: Vec<Batch>,
+    /// The pages of an arena.
+    pub pages: Buffer,
+    /// The arena's first byte in them.
+    pub before: u64,
+}
+
+/// Where the programs of a frame write it.
+pub(super) enum Drawn<'a> {
+    /// Where its reader is.
+    InPlace,
+    /// In a part of the device's own memory, from where it is copied.
+    Apart(&'a Buffer, Range<u64>),
+}
+
+/// Where the reader of a frame is: the buffer and the frame's first byte in it.
+#[derive(Clone, Copy)]
+pub(super) struct Target<'a>(pub &'a Buffer, pub u64);
+
+/// Records what writes a frame of `bytes` for its reader: one batch per tile.
+pub(super) fn record(
+    (device, compiled, tiles): (&Device, &Compiled, &[Tile]),
+    drawn: Drawn<'_>,
+    Target(reader, at): Target<'_>,
+    bytes: u64,
+) -> Result<Vec<Batch>, BackendError> {
+    let mut shown = Vec::new();
+    for (k, tile) in tiles.iter().enumerate() {
+        let mut batch = device.batch(compiled.replay);
+        match &drawn {
+            Drawn::Apart(buffer, part) => {
+                tile.show(&mut batch, compiled, buffer, part.clone());
+                if k + 1 == tiles.len() {
+                    batch.copy(buffer, part.start, reader, at, bytes);
+                }
+            }
+            Drawn::InPlace => tile.show(&mut batch, compiled, reader, at..at + bytes),
+        }
+        shown.push(batch.finish()?);
+    }
+    Ok(shown)
 }
 
 impl Imported {
@@ -32,23 +73,14 @@ impl Imported {
         let at = words::bytes(arena).as_mut_ptr().wrapping_sub(before);
         // SAFETY: whole pages, mapped by contract.
         let pages = unsafe { device.import(at, (end - first) as u64)? };
-        let mut shown = Vec::new();
-        for (k, tile) in tiles.iter().enumerate() {
-            let mut batch = device.batch(compiled.replay);
-            match drawn {
-                Some(drawn) => {
-                    tile.show(&mut batch, compiled, drawn, 0..drawn.bytes());
-                    if k + 1 == tiles.len() {
-                        batch.copy(drawn, 0, &pages, before as u64, bytes as u64);
-                    }
-                }
-                None => {
-                    let part = before as u64..(before + bytes) as u64;
-                    tile.show(&mut batch, compiled, &pages, part);
-                }
-            }
-            shown.push(batch.finish()?);
-        }
-        Ok(Imported { shown })
+        let before = before as u64;
+        let drawn = drawn.map_or(Drawn::InPlace, |own| Drawn::Apart(own, 0..own.bytes()));
+        let target = Target(&pages, before);
+        let shown = record((device, compiled, tiles), drawn, target, bytes as u64)?;
+        Ok(Imported {
+            shown,
+            pages,
+            before,
+        })
     }
 }

@@ -28,12 +28,12 @@
 //! Steps agree within rounding, since a driver may fuse a product and a sum.
 //!
 //! # A lost device
-//! Its last frame reports every world as not finite, and the daemon refuses all later commands by name. Where the device was chosen by
-//! `auto`, a GPU that does not start gives way to the CPU, and the daemon's notes say why.
+//! Its last frame reports every world as not finite, and the daemon refuses all later commands by name. `auto` leaves the worlds to the
+//! CPU where a GPU does not start, and the daemon's notes say why.
 //!
 //! # What is not measured
-//! These constants were chosen without a hardware GPU at hand: `HARDWARE` in `create` (size of kernels), the sizes in `workgroups`,
-//! `AUTO_WORLDS` in `options`, and that a GPU with its own memory draws a frame there and copies it out.
+//! These constants were chosen without a hardware GPU at hand: `HARDWARE` in `create` (size of kernels), the sizes in `workgroups`, and
+//! that a GPU with its own memory draws a frame there and copies it out.
 
 mod backend;
 mod bookkeeping;
@@ -46,6 +46,9 @@ mod mirror;
 mod offline;
 mod places;
 mod programs;
+mod shared;
+mod shared_commands;
+mod sharing;
 mod show;
 mod sizing;
 mod software;
@@ -55,5 +58,5 @@ mod words;
 mod workgroups;
 mod worlds;
 
-pub use create::{Wanted, create};
+pub use create::{Cuts, Wanted, create};
 pub use offline::{Offline, OfflineKernel, Target};

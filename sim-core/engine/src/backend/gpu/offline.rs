@@ -70,6 +70,7 @@ impl Offline {
         layout: &Layout,
         target: Target,
         lanes: usize,
+        cuts: create::Cuts,
     ) -> Result<Offline, BackendError> {
         let constants: Constants<f32> = match lanes {
             1 => model.constants().cast(),
@@ -81,10 +82,10 @@ impl Offline {
         let fields = layout.slots.iter().map(|slot| slot.field);
         let shown = evaluation_stages(m, fields.clone());
         let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
-        let limits = match target {
+        let limits = cuts.replace(match target {
             Target::Hardware => create::HARDWARE,
             Target::Software => software::LIMITS,
-        };
+        });
         let programs = Programs::new(
             m,
             &places,

@@ -8,7 +8,7 @@ use sim_physics::lane::Num;
 use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
 use sim_physics::times;
-use sim_record::split::{Kernel, Limits, Part, split};
+use sim_record::split::{Kernel, Limits, Part, Split, split};
 use sim_record::wgsl::{Exchange, ProgramOptions};
 use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, run};
@@ -79,16 +79,9 @@ impl Programs {
             false => (1, substeps),
         };
         let (recording, options) = step(m, places, &step_stages(m), inside, lanes)?;
-        let (mut step, step_spare) = partition(&recording, &options, how, places.len);
-        if outside > 1 {
-            step.order = vec![Part::Repeat {
-                iterations: outside,
-                parts: step.order,
-                exited: None,
-            }];
-        }
+        let (step, step_spare) = partition(&recording, &options, how, places.len, outside);
         let (recording, options) = evaluation(m, places, shown, computed, wanted)?;
-        let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len);
+        let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len, 1);
         Ok(Programs {
             step,
             evaluate,
@@ -97,11 +90,13 @@ impl Programs {
     }
 }
 
+/// Kernels of a recording that runs so many times.
 fn partition(
     recording: &Recording,
     options: &ProgramOptions,
     how: How,
     spare: u32,
+    times: usize,
 ) -> (KernelSequence, u32) {
     let options = ProgramOptions {
         exchange: how.exchange,
@@ -117,12 +112,60 @@ fn partition(
             workgroup: is_world.then_some(lanes),
         }
     };
-    let kernels = split.kernels.iter().map(source).collect();
-    let sequence = KernelSequence {
-        kernels,
-        order: split.order,
+    let mut kernels: Vec<KernelSource> = split.kernels.iter().map(source).collect();
+    let joined = match times {
+        1 => None,
+        _ => joined(&split, how.limits),
     };
-    (sequence, split.spare as u32)
+    let order = match joined {
+        None if times == 1 => split.order,
+        None => vec![repeated(times, split.order)],
+        Some(wgsl) => {
+            let joined = Part::Kernel(kernels.len());
+            kernels.push(KernelSource {
+                wgsl,
+                lanes: 1,
+                workgroup: None,
+            });
+            with_joined(split.order, joined, times)
+        }
+    };
+    (KernelSequence { kernels, order }, split.spare as u32)
+}
+
+fn repeated(iterations: usize, parts: Vec<Part>) -> Part {
+    Part::Repeat {
+        iterations,
+        parts,
+        exited: None,
+    }
+}
+
+/// The last kernel and the first one, which follows it in the next repetition, as one program: a dispatch less. None where several
+/// threads share a world of either, where they would be too large together, or where there are no two.
+fn joined(split: &Split, limits: Limits) -> Option<String> {
+    let (Part::Kernel(first), Part::Kernel(last)) = (split.order.first()?, split.order.last()?)
+    else {
+        return None;
+    };
+    let [first, last] = [first, last].map(|k| &split.kernels[*k]);
+    let lanes = [first, last].map(|kernel| kernel.recording().lanes());
+    let cost = first.cost(&limits.prices) + last.cost(&limits.prices);
+    let suits = split.order.len() > 1 && lanes == [1, 1] && cost <= limits.kernel;
+    suits.then(|| last.wgsl_before(first))
+}
+
+/// A b c, three times, with c and a joined: a b (ca) b (ca) b c.
+fn with_joined(order: Vec<Part>, joined: Part, times: usize) -> Vec<Part> {
+    let [first, middle @ .., last] = &order[..] else {
+        unreachable!("two kernels are joined");
+    };
+    let again = std::iter::once(joined).chain(middle.iter().cloned());
+    let mut parts = vec![first.clone()];
+    parts.extend_from_slice(middle);
+    parts.push(repeated(times - 1, again.collect()));
+    parts.push(last.clone());
+    parts
 }
 
 /// What a run of stages reads from before it, and what it writes.

@@ -292,6 +292,28 @@ impl Tile {
         true
     }
 
+    /// What a command of the host that waits is replaced by: one in shared memory.
+    pub fn unstage(&mut self, input: Input) {
+        let staged = self.commands.iter_mut();
+        staged
+            .filter(|command| command.is_of(input))
+            .for_each(StagedCommand::sent);
+    }
+
+    /// Writes a command of all worlds out of shared memory, where it begins at a byte.
+    pub fn write_shared(
+        &self,
+        device: &Device,
+        compiled: &Compiled,
+        input: Input,
+        shared: (&Buffer, u64),
+    ) -> Result<Batch, BackendError> {
+        let mut staged = self.commands.iter();
+        let staged = staged.find(|command| command.is_of(input));
+        let staged = staged.expect("every command can be staged");
+        staged.write_shared(device, compiled, &self.fields, shared, &self.worlds)
+    }
+
     /// Commands that wait.
     pub fn pending(&self) -> impl Iterator<Item = &Batch> {
         self.commands.iter().filter_map(StagedCommand::pending)

@@ -136,6 +136,8 @@ pub(super) struct StagedCommand {
     // dropped before the buffer that it names
     batch: Batch,
     rows: Upload,
+    /// What [`bookkeeping::ROWS`] reads of them.
+    head: Buffer,
     is_waiting: bool,
 }
 
@@ -169,10 +171,36 @@ impl StagedCommand {
                 columns,
                 batch: batch.finish()?,
                 rows,
+                head,
                 is_waiting: false,
             })
         });
         staged.collect()
+    }
+
+    /// Whether it is of this array.
+    pub fn is_of(&self, input: Input) -> bool {
+        self.input == input
+    }
+
+    /// What writes the command of these worlds out of memory that a client shares, where that of all worlds begins at a byte.
+    pub fn write_shared(
+        &self,
+        device: &Device,
+        compiled: &Compiled,
+        fields: &Buffer,
+        (shared, at): (&Buffer, u64),
+        worlds: &Range<usize>,
+    ) -> Result<Batch, BackendError> {
+        let row = 4 * self.columns as u64;
+        let words = (worlds.len() * self.columns) as u64;
+        let mut batch = device.batch(compiled.replay);
+        // a part of a buffer that begins anywhere can be copied, but not be bound
+        let first = at + row * worlds.start as u64;
+        batch.copy(shared, first, self.rows.buffer(), 0, 4 * words);
+        let target = (device, &compiled.rows, fields);
+        write_rows(&mut batch, target, self.rows.buffer(), &self.head, words);
+        Ok(batch.finish()?)
     }
 
     /// Whether these columns of an array are the whole command.

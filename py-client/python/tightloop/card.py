@@ -1,0 +1,229 @@
+"""Frames and commands on the GPU of a simulation, for this process's torch, CuPy or JAX.
+
+Each frame that a client holds has a slot in device memory. The daemon writes it when it writes the frame, and gives it
+to another frame only after this client dropped it. Commands have a place of their own there.
+
+Before each command the client signals that its stream has done what it was given so far: reading dropped frames, and
+writing commands. The daemon's card waits for that. Frames whose arrays were dropped go back to the daemon after the
+signal: work that was queued between two signals may still read them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tightloop.array_libraries import ArrayLibrary, Torch, array_library, check_array, gpu_of
+from tightloop.cuda import Import, driver
+from tightloop.errors import CommandRefused, GpuMemoryError
+
+#: Types of fields, as the daemon and as NumPy name them
+_NUMPY = {"f32": "<f4", "f64": "<f8", "i32": "<i4", "u32": "<u4", "u64": "<u8", "u8": "|u1"}
+#: Columns of a mocap body
+_MOCAP = {"mocap_pos": 3, "mocap_quat": 4}
+
+
+class CardArray:
+    """An array in device memory, ``(worlds, …)``, row-major. It keeps its frame, or the commands' memory, alive.
+
+    It has ``__cuda_array_interface__`` and ``__dlpack__``, so that ``cupy.asarray`` and ``jax.dlpack.from_dlpack`` copy
+    nothing. Do not write to an array of a frame.
+    """
+
+    def __init__(self, card: Card, owner: Any, address: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+        self._card, self._owner, self._is_lent = card, owner, False
+        self.shape, self.dtype = shape, dtype
+        size = int(np.prod(shape, dtype=np.int64))
+        self.__cuda_array_interface__ = {
+            "version": 3,
+            "shape": shape,
+            "typestr": dtype.str,
+            "data": (address if size else 0, False),
+            "strides": None,
+            "stream": None,
+        }
+
+    def __del__(self) -> None:
+        # the GPU may still read a frame: the card gives it back
+        if self._owner is not None:
+            self._card._dropped.append((self._owner, self._is_lent))
+
+    def __dlpack__(self, **options: Any) -> Any:
+        self._is_lent = True
+        return self._card.view(self).__dlpack__(**options)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return (2, self._card.device)  # kDLCUDA
+
+
+class Card:
+    """Memory of a simulation's GPU in this process.
+
+    Args:
+        info: The daemon's description.
+        there: Its description of the memory.
+        memory: The memory in CUDA.
+        library: Library of the arrays.
+
+    Attributes:
+        device: Index of the CUDA device.
+        order: How the work of both processes is ordered: ``"timelines"`` on the card, or ``"host: …"`` with the reason.
+    """
+
+    def __init__(
+        self, info: Mapping[str, Any], there: Mapping[str, Any], memory: Import, library: ArrayLibrary
+    ) -> None:
+        self._memory, self._library = memory, library
+        self._worlds: int = info["worlds"]
+        self._stride: int = there["stride"]
+        self._fields = {
+            field["name"]: (offset, tuple(field["shape"]), np.dtype(_NUMPY[field["dtype"]]))
+            for field, offset in zip(info["fields"], there["offsets"], strict=True)
+        }
+        self._commands = {place["name"]: (1 << bit, place) for bit, place in enumerate(there["commands"])}
+        self._ready = 0
+        # what keeps each frame whose array was dropped, and whether another library had it
+        self._dropped: list[tuple[Any, bool]] = []
+        self.device = memory.device
+        self.order = "timelines" if there["host_order"] is None else f"host: {there['host_order']}"
+
+    def view(self, array: CardArray) -> Any:
+        """Return an array of torch or CuPy over the same memory."""
+        return self._library.view(array, self.device)
+
+    def array(self, sample: Any, name: str, slot: int, done: int) -> CardArray:
+        """Return a field of the frame in a slot, once the daemon has written it.
+
+        Args:
+            sample: What keeps the frame.
+            name: The field.
+            slot: The slot.
+            done: Value of the timeline of frames then.
+        """
+        self._memory.wait_for_frame(done, self._stream())
+        offset, shape, dtype = self._fields[name]
+        return CardArray(self, sample, self._memory.pointer + slot * self._stride + offset, shape, dtype)
+
+    def torch(self, sample: Any, name: str, slot: int, done: int) -> Any:
+        """Return a field of the frame in a slot as a tensor of torch; the arguments are those of `array`."""
+        library = self._library if isinstance(self._library, Torch) else Torch()
+        return library.view(self.array(sample, name, slot, done), self.device)
+
+    def take(self, given: dict[str, Any]) -> tuple[int, int]:
+        """Take the commands that are on the GPU out of a dict of commands by name, and leave them to the daemon.
+
+        Returns:
+            The value that the daemon's card waits for, and a bit for each command.
+
+        Raises:
+            CommandRefused: A tensor has a wrong shape or dtype, is elsewhere, or is of a command of the host.
+        """
+        left = 0
+        for name, value in given.items():
+            if value is None or gpu_of(value) is None:
+                continue
+            if name not in self._commands:
+                taken = ", ".join(self._commands)
+                raise CommandRefused(f"{name}: not taken on the GPU, which takes {taken}; give {name}.cpu()")
+            bit, place = self._commands[name]
+            columns = place["columns"]
+            # mocap bodies come as (…, mocaps, 3), and lie in a row
+            width = _MOCAP.get(name)
+            is_apart = width is not None and tuple(value.shape[-2:]) == (columns // width, width)
+            flat = value.reshape(*value.shape[:-2], columns) if is_apart else value
+            check_array(name, flat, self._worlds, columns, self.device)
+            shape = (self._worlds, columns)
+            address = self._memory.pointer + place["offset"]
+            self._library.copy(self.view(CardArray(self, None, address, shape, np.dtype(np.float32))), flat)
+            given[name] = None
+            left |= bit
+        dropped = len(self._dropped)
+        self._ready += 1
+        self._memory.signal(self._ready, self._stream())
+        self._give_back(dropped)
+        return self._ready, left
+
+    def synchronize(self) -> None:
+        """Wait until this process's stream has done what it was given so far."""
+        dropped = len(self._dropped)
+        self._memory.synchronize(self._stream())
+        self._give_back(dropped)
+
+    def _give_back(self, count: int) -> None:
+        """Give the daemon the frames that were dropped first, which no work queued from now on reads."""
+        # JAX reads on streams of its own, which no signal covers
+        if any(is_lent for _, is_lent in self._dropped[:count]):
+            self._memory.synchronize_device()
+        del self._dropped[:count]
+
+    def _stream(self) -> int:
+        return self._library.stream(self.device)
+
+
+class NoCard:
+    """In place of a card while the daemon has memory that this process could not map."""
+
+    def synchronize(self) -> None:
+        """Do nothing: this process's GPU reads no frame in that memory."""
+
+    def array(self, *_: Any) -> Any:
+        """Raise `GpuMemoryError`."""
+        raise GpuMemoryError(
+            "this frame is not on a GPU that this process sees, since the last `sim.keep_on_gpu()` failed: call it "
+            "again, and take the tensors of frames that come after it"
+        )
+
+    torch = array
+
+
+class KeepsOnGpu:
+    """Part of `tightloop.Sim`: frames and commands that stay on the GPU."""
+
+    _card: Card | None = None
+
+    def keep_on_gpu(self) -> Card:
+        """Keep frames and commands on the GPU, too, until this client gives up control.
+
+        From the next frame on, ``frame.torch("joint_q")`` returns a tensor of torch in the memory that the daemon
+        writes, and ``frame.cuda("joint_q")`` an array for CuPy and JAX. Both are as valid as ``frame.joint_q``: they
+        hold the frame, and stay unchanged until you drop them. Do not write to them. Earlier frames have none. After a
+        call that fails, later frames have none either, until another call succeeds.
+
+        Commands of `step` and `send` may then be arrays on the GPU, shape ``(worlds, columns)`` or ``(columns,)``:
+        ``joint_f``, ``joint_target_q``, ``joint_target_qd``, ``ctrl``, ``mocap_pos`` and ``mocap_quat``. Nothing passes
+        through the host; one that the daemon refuses or a recorder wants is read back first. Commands by tensor are not
+        checked for likely mistakes.
+
+        Work is ordered on the current stream of torch, or of CuPy where torch is not installed. If you use several
+        streams, let the current one wait for the others before you drop a tensor or step.
+
+        A frame whose tensors you dropped counts as held until the next command other than `recv`, since queued work may
+        still read it. If JAX or another library had one by DLPack, that command first waits for the whole GPU.
+
+        Returns:
+            The card, with ``device``, the index of the CUDA device, and ``order``: ``"timelines"``, or ``"host: …"``
+            with the reason why each step waits for the stream.
+
+        Raises:
+            GpuMemoryError: The worlds are on the CPU, the driver exports no memory, or CUDA does not see that GPU.
+            MissingLibrary: ``cuda-bindings``, or both torch and CuPy, are not installed.
+            LeaseHeld: Another client controls the daemon. Other errors are those of `step`.
+        """
+        info, client = self.info, self._client  # type: ignore[attr-defined]
+        if not info["adapter"]:
+            raise GpuMemoryError('keep_on_gpu: the worlds are on the CPU; launch with device="gpu"')
+        library = array_library()
+        driver()  # before the daemon takes memory
+        client.land()  # with a step in flight the request is refused, and the card stays
+        # from here on the daemon may write other memory than an earlier card maps
+        self._card = None
+        client.keep_on(NoCard())
+        text, descriptors = client.device_memory()
+        there = json.loads(text)
+        card = Card(info, there, Import(there, descriptors), library)
+        self._card = card
+        client.keep_on(card)
+        return card
