@@ -1,9 +1,10 @@
 //! Build time of worlds, measured in separate processes: a driver caches what it compiled in memory and on disk.
 
+use crate::arguments::Arguments;
 use crate::scenes::{Plan, Scene};
-use crate::{Arguments, FIELDS, Place, build, options};
+use crate::{FIELDS, Place, build, options};
 use anyhow::{Context, ensure};
-use sim_engine::options::{Adapter, AdapterInfo, Replay};
+use sim_engine::options::AdapterInfo;
 use std::path::Path;
 use std::process::Command;
 
@@ -48,11 +49,7 @@ pub fn build_and_print(
     info: &AdapterInfo,
     folder: &Path,
 ) -> anyhow::Result<()> {
-    let place = Place {
-        adapter: Adapter::Index(info.index),
-        cache: folder.to_owned(),
-        replay: Replay::Recorded,
-    };
+    let place = Place::new(arguments, info, folder);
     let scene = *arguments.scenes.first().context("a scene")?;
     let worlds = *arguments.worlds.first().context("a number of worlds")?;
     let (sim, seconds) = build(&Plan::new(scene), &options(&place, worlds, &FIELDS))?;

@@ -15,19 +15,33 @@ const GRASP: &str = include_str!("../../tests/data/mujoco_grasp.csv");
 const TARGET_MAX: f64 = 2e-6;
 const GRASP_MAX: f64 = 1e-4;
 const CUBE_MAX: f64 = 2e-4;
-/// Worlds among which others are looked for, and frames of that. Programs are made for a number of worlds: no one measures this
-/// one, which is no whole number of workgroups either, so that the last world has a neighbour that only runs along.
-const MANY: usize = 4031;
+/// Frames of the runs whose bits are compared.
 const FRAMES: usize = 12;
 
-/// Runs all checks on an adapter.
-pub fn check(place: &Place, scenes: &[Scene]) -> anyhow::Result<()> {
+/// Runs all checks of these scenes on an adapter. Worlds must have the same bits alone, among seven, and among each of `counts`.
+pub fn check(place: &Place, scenes: &[Scene], counts: &[usize]) -> anyhow::Result<()> {
+    for &scene in scenes {
+        match scene {
+            Scene::Target => follows_target(place)?,
+            Scene::Grasp => follows_grasp(place)?,
+            _ => {}
+        }
+        has_same_bits(place, scene, counts)?;
+    }
+    Ok(())
+}
+
+fn follows_target(place: &Place) -> anyhow::Result<()> {
     let [target, _] = deviation(place, Scene::Target, TARGET)?;
     println!("target demo: within {target:.1e} of MuJoCo C (at most {TARGET_MAX:.0e})");
     ensure!(
         target < TARGET_MAX,
         "the target demo is wrong by {target:e}"
     );
+    Ok(())
+}
+
+fn follows_grasp(place: &Place) -> anyhow::Result<()> {
     let [arm, cube] = deviation(place, Scene::Grasp, GRASP)?;
     println!(
         "grasp: arm within {arm:.1e} (at most {GRASP_MAX:.0e}), cube within {cube:.1e} (at most {CUBE_MAX:.0e})"
@@ -37,32 +51,42 @@ pub fn check(place: &Place, scenes: &[Scene]) -> anyhow::Result<()> {
         cube < CUBE_MAX,
         "the cube of the grasp is wrong by {cube:e}"
     );
-    for &scene in scenes {
-        let name = scene.name();
-        let plan = Plan::new(scene);
-        let last = MANY - 1;
-        let all = bits(place, &plan, &WorldSet::all(MANY))?;
-        let few = [last, 2, 0, MANY / 2, 1, 5, 3];
-        for (id, found) in few
-            .iter()
-            .zip(bits(place, &plan, &WorldSet::some(&few, MANY))?)
-        {
+    Ok(())
+}
+
+/// Compares worlds of the largest number with the same worlds among fewer. Programs are made for a number of worlds.
+fn has_same_bits(place: &Place, scene: Scene, counts: &[usize]) -> anyhow::Result<()> {
+    let name = scene.name();
+    let plan = Plan::new(scene);
+    let many = counts.iter().copied().max().context("a number of worlds")?;
+    ensure!(many > 7, "give more than 7 worlds to compare with");
+    let last = many - 1;
+    let all = bits(place, &plan, &WorldSet::all(many))?;
+    // from the first to the last, as far apart as they may be
+    let spread = |count: usize| (0..count).map(move |k| k * last / (count - 1)).collect();
+    let fewer = counts.iter().filter(|count| (2..many).contains(*count));
+    let mut sets: Vec<Vec<usize>> = fewer.map(|count| spread(*count)).collect();
+    sets.push(vec![last, 2, 0, many / 2, 1, 5, 3]);
+    sets.push(vec![last]);
+    for ids in &sets {
+        let found = bits(place, &plan, &WorldSet::some(ids, many))?;
+        for (id, found) in ids.iter().zip(found) {
             ensure!(
                 found == all[*id],
-                "{name}: world {id} of {MANY} has other bits among seven"
+                "{name}: world {id} of {many} has other bits among {}",
+                ids.len()
             );
         }
-        let alone = bits(place, &plan, &WorldSet::some(&[last], MANY))?;
-        ensure!(
-            alone[0] == all[last],
-            "{name}: the last of {MANY} worlds has other bits alone"
-        );
-        ensure!(
-            all[0] != all[last],
-            "{name}: worlds that differ show the same"
-        );
-        println!("{name}: same bits among 1, 7 and {MANY} worlds");
     }
+    ensure!(
+        all[0] != all[last],
+        "{name}: worlds that differ show the same"
+    );
+    let among: Vec<String> = sets.iter().rev().map(|ids| ids.len().to_string()).collect();
+    println!(
+        "{name}: same bits among {} and {many} worlds",
+        among.join(", ")
+    );
     Ok(())
 }
 

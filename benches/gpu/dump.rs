@@ -1,8 +1,9 @@
 //! Writes the kernels of a scene, and states of its run, for benches/gpu/offline. It needs no GPU: the CPU plays the run unless
 //! `--on-adapter` is given.
 
+use crate::arguments::Arguments;
 use crate::scenes::{Plan, Scene, WorldSet};
-use crate::{Arguments, FIELDS, chosen};
+use crate::{FIELDS, chosen};
 use anyhow::Context;
 use serde_json::{Value, json};
 use sim_device::Source;
@@ -49,7 +50,13 @@ fn write_scene(
         true => Target::Software,
         false => Target::Hardware,
     };
-    let offline = Offline::new(&plan.model, &layout, target, arguments.lanes)?;
+    let offline = Offline::new(
+        &plan.model,
+        &layout,
+        target,
+        arguments.lanes,
+        arguments.cuts(),
+    )?;
     write_kernels(folder, &plan, &offline, worlds)?;
     let mut sim = Simulation::new(plan.model.clone(), &options)?;
     let mut words = vec![0; sim.layout().bytes / 8];

@@ -3,6 +3,7 @@
 //! One binary that needs a Vulkan driver and nothing else; benches/gpu/run.sh builds it, or takes the one that lies beside it.
 //! If a run deviates from MuJoCo's, if bits depend on the number of worlds, or if a device is lost, it prints no results and exits with 1.
 
+mod arguments;
 mod build_time;
 mod checks;
 #[path = "../../tests/common/mod.rs"]
@@ -16,15 +17,16 @@ mod robots;
 mod scenes;
 
 use anyhow::Context;
+use arguments::{Arguments, Checks, Side};
 use clap::Parser;
 use measure::Frames;
 use pages::Pages;
-use report::{Report, Row};
-use scenes::{Plan, Scene, WorldSet};
-use sim_engine::options::{Adapter, AdapterInfo, Replay, adapters};
+use report::{GpuSide, Report, Row};
+use scenes::{Plan, WorldSet};
+use sim_engine::options::{Adapter, AdapterInfo, Cuts, Replay, adapters};
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_physics::arrays::Field;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// What a frame shows while it is measured.
@@ -33,62 +35,26 @@ const FIELDS: [Field; 3] = [Field::JointQ, Field::JointQd, Field::BodyQ];
 /// Worlds with which replay is compared: so few that commands and counters cost next to nothing beside the batches.
 const REPLAY_WORLDS: usize = 64;
 
-/// Checks worlds on a GPU, then measures them.
-#[derive(Parser)]
-struct Arguments {
-    /// Adapter, by index or by part of its name.
-    #[arg(long)]
-    adapter: Option<String>,
-    /// Numbers of worlds.
-    #[arg(long, value_delimiter = ',', default_value = "1024,4096,16384,65536")]
-    worlds: Vec<usize>,
-    /// Scenes.
-    #[arg(
-        long,
-        value_delimiter = ',',
-        default_value = "torque_free,target,grasp,quadruped"
-    )]
-    scenes: Vec<Scene>,
-    /// How long each is measured at least [s]; whole runs are.
-    #[arg(long, default_value_t = 2.0)]
-    seconds: f64,
-    /// File for the results.
-    #[arg(long)]
-    csv: Option<PathBuf>,
-    /// Frames are copied by the host, even where the device could write them to their readers.
-    #[arg(long)]
-    no_import: bool,
-    /// The processor is left out.
-    #[arg(long)]
-    no_cpu: bool,
-    /// What else the head of the file says, as `name: value`.
-    #[arg(long)]
-    fact: Vec<String>,
-    /// Writes the kernels of the scenes and states of their runs to this folder, without a GPU: benches/gpu/offline reads them.
-    #[arg(long)]
-    dump: Option<PathBuf>,
-    /// Frames before and after which the states are written.
-    #[arg(long, value_delimiter = ',', default_value = "40")]
-    frames: Vec<usize>,
-    /// Writes the kernels of the software driver, not those of hardware.
-    #[arg(long)]
-    software: bool,
-    /// Threads that share a world, where contacts can be.
-    #[arg(long, default_value_t = 8)]
-    lanes: usize,
-    /// The adapter steps the worlds of the dump, not the CPU.
-    #[arg(long)]
-    on_adapter: bool,
-    /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
-    #[arg(long, hide = true)]
-    build_in: Option<PathBuf>,
-}
-
-/// Where worlds are kept: an adapter, with a folder for its programs.
+/// Where worlds are kept: an adapter, with a folder for its programs, and how those are made.
 pub struct Place {
     adapter: Adapter,
     cache: PathBuf,
     replay: Replay,
+    world_threads: Option<usize>,
+    cuts: Cuts,
+}
+
+impl Place {
+    /// An adapter, with all else as the command line has it.
+    fn new(arguments: &Arguments, info: &AdapterInfo, cache: &Path) -> Place {
+        Place {
+            adapter: Adapter::Index(info.index),
+            cache: cache.to_owned(),
+            replay: Replay::Recorded,
+            world_threads: arguments.world_threads,
+            cuts: arguments.cuts(),
+        }
+    }
 }
 
 /// Worlds of that place with these fields.
@@ -100,6 +66,8 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
             cache: Some(place.cache.clone()),
         },
         replay: place.replay,
+        world_threads: place.world_threads,
+        cuts: place.cuts,
         fields: fields.to_vec(),
         ..Options::default()
     }
@@ -115,38 +83,58 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = &arguments.build_in {
         return build_time::build_and_print(&arguments, &info, folder);
     }
-    let cache = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
-    let place = Place {
-        adapter: Adapter::Index(info.index),
-        cache: cache.clone(),
-        replay: Replay::Recorded,
-    };
-    let done = run(&arguments, &info, place);
-    let _ = std::fs::remove_dir_all(cache);
+    let own = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
+    let cache = arguments.cache.as_ref().unwrap_or(&own);
+    let done = run(&arguments, &info, &Place::new(&arguments, &info, cache));
+    let _ = std::fs::remove_dir_all(own);
     done
 }
 
-fn run(arguments: &Arguments, info: &AdapterInfo, place: Place) -> anyhow::Result<()> {
-    let mut report = Report::new(info, &arguments.fact);
-    checks::check(&place, &arguments.scenes)?;
+fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Result<()> {
+    let csv = arguments.csv.as_deref();
+    let mut report = Report::new(info, &arguments.fact, csv, arguments.append)?;
+    if arguments.checks != Checks::Skip {
+        checks::check(place, &arguments.scenes, &arguments.check_worlds)?;
+    }
+    if arguments.checks == Checks::Only {
+        return Ok(());
+    }
     report.head();
     for &scene in &arguments.scenes {
         let plan = Plan::new(scene);
-        let mut replay = Some(replay(&place, &plan, arguments)?);
+        // it is the scene's, and stands in its first row
+        let mut replay = match arguments.brief || arguments.side == Side::Cpu {
+            true => None,
+            false => Some(replay(place, &plan, arguments)?),
+        };
         for &worlds in &arguments.worlds {
-            let row = measure(arguments, info, &place, &plan, worlds)?;
-            // it is the scene's, and stands in its first row
+            let gpu = match arguments.side {
+                Side::Cpu => None,
+                _ => Some(GpuSide {
+                    replay: replay.take(),
+                    ..on_gpu(arguments, info, place, &plan, worlds)?
+                }),
+            };
+            let cpu = match arguments.side {
+                Side::Gpu => None,
+                _ => Some(on_cpu(arguments, place, &plan, worlds)?),
+            };
             report.add(Row {
-                replay: replay.take(),
-                ..row
-            });
+                scene: plan.scene,
+                worlds,
+                dofs: plan.model.dofs(),
+                substeps: plan.model.substeps(),
+                world_threads: arguments.world_threads,
+                cuts: place.cuts,
+                gpu,
+                cpu,
+            })?;
         }
     }
-    report.notes();
-    match &arguments.csv {
-        Some(path) => report.write(path),
-        None => Ok(()),
+    if !arguments.brief {
+        report.notes();
     }
+    Ok(())
 }
 
 /// The adapter that is meant.
@@ -190,15 +178,18 @@ fn replay(place: &Place, plan: &Plan, arguments: &Arguments) -> anyhow::Result<[
     Ok(found)
 }
 
-/// All about a scene with so many worlds, but for its replay.
-fn measure(
+/// The adapter's side of a scene with so many worlds, but for its replay.
+fn on_gpu(
     arguments: &Arguments,
     info: &AdapterInfo,
     place: &Place,
     plan: &Plan,
     worlds: usize,
-) -> anyhow::Result<Row> {
-    let [cold_s, cached_s] = build_time::build_twice(info, plan.scene, worlds)?;
+) -> anyhow::Result<GpuSide> {
+    let cold_and_cached_s = match arguments.brief {
+        true => None,
+        false => Some(build_time::build_twice(info, plan.scene, worlds)?),
+    };
     let wanted = Duration::from_secs_f64(arguments.seconds);
     let crowd = WorldSet::all(worlds);
     let options = options(place, worlds, &FIELDS);
@@ -206,37 +197,36 @@ fn measure(
     // before the worlds, so that the pages are there until those are gone
     let mut pages = Pages::new(words)?;
     let mut heap = vec![0; words];
-    let (mut sim, _) = build(plan, &options)?;
+    let (mut sim, build_s) = build(plan, &options)?;
     let staged = Frames::measure(&mut sim, plan, &crowd, &mut heap, wanted)?;
     // SAFETY: the pages go after the worlds, and no one else has them.
     let imports = !arguments.no_import && unsafe { sim.import(pages.words()) };
     let imported = imports
         .then(|| Frames::measure(&mut sim, plan, &crowd, pages.words(), wanted))
         .transpose()?;
-    let programs = sim.programs().to_vec();
-    drop(sim);
-    let cpu = match arguments.no_cpu {
-        true => None,
-        false => {
-            let options = Options {
-                device: Device::Cpu,
-                ..options
-            };
-            let (mut sim, _) = build(plan, &options)?;
-            Some(Frames::measure(&mut sim, plan, &crowd, &mut heap, wanted)?)
-        }
-    };
-    Ok(Row {
-        scene: plan.scene,
-        worlds,
-        dofs: plan.model.dofs(),
-        substeps: plan.model.substeps(),
-        programs,
-        cold_s,
-        cached_s,
+    Ok(GpuSide {
+        programs: sim.programs().to_vec(),
+        build_s,
+        cold_and_cached_s,
         staged,
         imported,
         replay: None,
-        cpu,
     })
+}
+
+/// The processor's side, on all cores.
+fn on_cpu(
+    arguments: &Arguments,
+    place: &Place,
+    plan: &Plan,
+    worlds: usize,
+) -> anyhow::Result<Frames> {
+    let options = Options {
+        device: Device::Cpu,
+        ..options(place, worlds, &FIELDS)
+    };
+    let (mut sim, _) = build(plan, &options)?;
+    let mut words = vec![0; sim.layout().bytes / 8];
+    let wanted = Duration::from_secs_f64(arguments.seconds);
+    Frames::measure(&mut sim, plan, &WorldSet::all(worlds), &mut words, wanted)
 }

@@ -3,10 +3,10 @@
     python benches/gpu/peers.py --worlds 1024,4096 --scenes grasp --csv FILE
 
 Needs tightloop (for the scenes) and `mujoco`, and measures those of `mujoco_warp` and `mujoco.mjx` that can be
-imported; of the others, and of scenes that one of them refuses, it says so and why. The models are MuJoCo's, made of
-the URDF files that main.rs carries. A frame is what it is there: commands of all worlds to the device, 8 steps as one
-recorded graph or one compiled function, then joint positions, velocities and body poses as arrays of the host. Columns
-are those of run.sh.
+imported and have a GPU. It prints why it leaves out the others, and scenes that one of them refuses. The models are
+MuJoCo's, made of the URDF files that main.rs carries. A frame is what it is there: commands of all worlds to the
+device, 8 steps as one recorded graph or one compiled function, then joint positions, velocities and body poses as
+arrays of the host. Columns are those of run.sh, besides the device, the commit and the date.
 
 Like with like: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0. Not
 the same: all worlds are alike here, cubes and commands, and contacts are found by each engine's own means.
@@ -160,6 +160,21 @@ def mjx(plan: Plan, worlds: int) -> tuple[Frame, Callable[[], None]]:
 SIDES = {"mujoco_warp": warp, "mujoco.mjx": mjx}
 
 
+def warp_device() -> tuple[str, bool]:
+    """The device of MuJoCo-Warp, and whether it is a GPU."""
+    device = importlib.import_module("warp").get_device()
+    return device.name, device.is_cuda
+
+
+def mjx_device() -> tuple[str, bool]:
+    """The device of MJX, and whether it is a GPU."""
+    device = importlib.import_module("jax").devices()[0]
+    return f"{device.device_kind} ({device.platform})", device.platform in ("gpu", "cuda", "rocm")
+
+
+DEVICES = {"mujoco_warp": warp_device, "mujoco.mjx": mjx_device}
+
+
 def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str | int]:
     """A row: whole runs from the start until the seconds are over."""
     begin = time.perf_counter()
@@ -199,17 +214,36 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
     }
 
 
-def installed() -> list[str]:
-    """Those that can be imported; of the others it is said why not."""
-    found = []
+def installed() -> dict[str, str]:
+    """Those that can be imported and have a GPU, with its name; it prints why the others are left out."""
+    found = {}
     for side in SIDES:
         try:
             importlib.import_module(side)
-        except ImportError as error:
+            device, is_gpu = DEVICES[side]()
+        except Exception as error:  # of a package that is missing, or of a driver that does not answer
             print(f"{side} is not measured: {error}")
+            continue
+        if is_gpu:
+            found[side] = device
         else:
-            found.append(side)
+            print(f"{side} is not measured: its device is no GPU but {device}")
     return found
+
+
+def write(path: Path, rows: list[dict[str, str | int]], *, append: bool) -> None:
+    """Write the rows below what they are of, or below the rows of another call."""
+    if append:
+        lines = (line for line in path.read_text().splitlines() if not line.startswith("#"))
+        if next(lines, "") != ",".join(rows[0]):
+            raise SystemExit(f"{path}: it has other columns; delete it, or leave `--append` out")
+    with path.open("a" if append else "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        if not append:
+            command = " ".join(sys.argv)
+            file.write(f"# mujoco: {mujoco.__version__}\n# command: {command}\n# date: {time.strftime('%F')}\n")
+            writer.writeheader()
+        writer.writerows(rows)
 
 
 def main() -> int:
@@ -219,26 +253,28 @@ def main() -> int:
     parser.add_argument("--scenes", default=",".join(SCENES), help="scenes")
     parser.add_argument("--seconds", type=float, default=2.0, help="how long each is measured at least")
     parser.add_argument("--csv", type=Path, help="file for the results")
+    parser.add_argument("--append", action="store_true", help="add to that file")
+    parser.add_argument("--fact", action="append", default=[], help="`commit: NAME`, for the rows")
+    parser.add_argument("--installed", action="store_true", help="only say which can be measured; 1 where none can")
     arguments = parser.parse_args()
-    rows = []
-    for side in installed():
+    facts = dict(fact.split(": ", 1) for fact in arguments.fact)
+    of_all = {"commit": facts.get("commit", "unknown"), "date": time.strftime("%F", time.gmtime())}
+    sides, rows = installed(), []
+    if arguments.installed:
+        print(*sides)
+        return int(not sides)
+    for side, device in sides.items():
         for name in arguments.scenes.split(","):
             for worlds in map(int, arguments.worlds.split(",")):
                 try:
-                    row = measure(Plan(name), side, worlds, arguments.seconds)
+                    row = measure(Plan(name), side, worlds, arguments.seconds) | {"device": device} | of_all
                 except Exception as error:  # each engine refuses in its own way
                     print(f"{side} does not run {name} with {worlds} worlds: {type(error).__name__}: {error}")
                     continue
                 print("  ".join(f"{name} {value}" for name, value in row.items()))
                 rows.append(row)
     if arguments.csv and rows:
-        with arguments.csv.open("w", newline="") as file:
-            file.write(
-                f"# mujoco: {mujoco.__version__}\n# command: {' '.join(sys.argv)}\n# date: {time.strftime('%F')}\n"
-            )
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
+        write(arguments.csv, rows, append=arguments.append and arguments.csv.exists())
     return int(not rows)
 
 

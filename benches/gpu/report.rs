@@ -2,10 +2,12 @@
 
 use crate::measure::Frames;
 use crate::scenes::Scene;
-use anyhow::Context;
-use sim_engine::options::AdapterInfo;
+use anyhow::{Context, ensure};
+use sim_engine::options::{AdapterInfo, Cuts};
 use sim_engine::simulation::ProgramInfo;
-use std::path::Path;
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 /// A scene with so many worlds.
 pub struct Row {
@@ -13,89 +15,131 @@ pub struct Row {
     pub worlds: usize,
     pub dofs: usize,
     pub substeps: usize,
+    /// Threads per world and cuts that were asked for.
+    pub world_threads: Option<usize>,
+    pub cuts: Cuts,
+    pub gpu: Option<GpuSide>,
+    /// The processor's, on all cores.
+    pub cpu: Option<Frames>,
+}
+
+/// What was measured of an adapter.
+pub struct GpuSide {
     pub programs: Vec<ProgramInfo>,
-    /// Until worlds have made their first frame, in a process that finds nothing kept, and in one after it [s].
-    pub cold_s: f64,
-    pub cached_s: f64,
+    /// Until these worlds have made their first frame [s].
+    pub build_s: f64,
+    /// The same in a process that finds nothing kept, and in one after it [s].
+    pub cold_and_cached_s: Option<[f64; 2]>,
     /// Frames that the host copies, and that the device writes to their reader.
     pub staged: Frames,
     pub imported: Option<Frames>,
     /// Processor time of the thread that asks for a frame, its batches recorded and encoded each time [µs].
     pub replay: Option<[f64; 2]>,
-    /// The processor's, on all cores.
-    pub cpu: Option<Frames>,
+}
+
+impl GpuSide {
+    /// The frames that count: as they come to their readers.
+    fn frames(&self) -> &Frames {
+        self.imported.as_ref().unwrap_or(&self.staged)
+    }
+
+    fn in_step(&self) -> impl Iterator<Item = &ProgramInfo> {
+        self.programs.iter().filter(|p| p.dispatches.is_some())
+    }
+}
+
+/// A number with so many digits, or a dash where there is none.
+fn or_dash(x: Option<f64>, digits: usize) -> String {
+    match x {
+        Some(x) => format!("{x:.digits$}"),
+        None => "–".to_owned(),
+    }
 }
 
 /// A column: its name, and what stands in it.
 type Cell = (&'static str, String);
 
 impl Row {
-    /// The frames that count: as they come to their readers.
-    fn frames(&self) -> &Frames {
-        self.imported.as_ref().unwrap_or(&self.staged)
-    }
-
     fn cells(&self) -> Vec<Cell> {
-        let frames = self.frames();
         let steps = self.worlds * self.substeps;
-        let in_step = || self.programs.iter().filter(|p| p.dispatches.is_some());
-        let dispatches: usize = self.programs.iter().filter_map(|p| p.dispatches).sum();
-        let or_dash = |x: Option<f64>, digits: usize| match x {
-            Some(x) => format!("{x:.digits$}"),
-            None => "–".to_owned(),
-        };
+        let gpu = self.gpu.as_ref();
+        let frames = gpu.map(GpuSide::frames);
+        let count = |f: &dyn Fn(&GpuSide) -> usize| or_dash(gpu.map(|gpu| f(gpu) as f64), 0);
+        let of_frames = |f: &dyn Fn(&Frames) -> f64, digits| or_dash(frames.map(f), digits);
+        let builds = gpu.and_then(|gpu| gpu.cold_and_cached_s);
+        let replay = gpu.and_then(|gpu| gpu.replay);
+        let rate = frames.map(|frames| frames.rate(steps));
         let cpu = self.cpu.as_ref().map(|cpu| cpu.rate(steps));
+        let asked = |x: Option<usize>| x.map_or("auto".to_owned(), |x| x.to_string());
+        let yes = |yes: bool| if yes { "yes" } else { "no" }.to_owned();
+        let measured = frames.or(self.cpu.as_ref());
         vec![
             ("scene", self.scene.name().to_owned()),
             ("worlds", self.worlds.to_string()),
             ("dofs", self.dofs.to_string()),
-            ("kernels", in_step().count().to_string()),
-            ("dispatches", dispatches.to_string()),
+            ("world_threads", asked(self.world_threads)),
+            ("kernel_size", asked(self.cuts.kernel)),
+            ("dispatch_price", asked(self.cuts.dispatch)),
+            ("kernels", count(&|gpu| gpu.in_step().count())),
+            (
+                "dispatches",
+                count(&|gpu| gpu.in_step().filter_map(|p| p.dispatches).sum()),
+            ),
             (
                 "statements",
-                in_step().map(|p| p.statements).sum::<usize>().to_string(),
+                count(&|gpu| gpu.in_step().map(|p| p.statements).sum()),
             ),
-            ("cold_s", format!("{:.2}", self.cold_s)),
-            ("cached_s", format!("{:.2}", self.cached_s)),
-            ("steps_per_s", format!("{:.0}", frames.rate(steps))),
+            ("build_s", or_dash(gpu.map(|gpu| gpu.build_s), 2)),
+            ("cold_s", or_dash(builds.map(|b| b[0]), 2)),
+            ("cached_s", or_dash(builds.map(|b| b[1]), 2)),
+            ("steps_per_s", or_dash(rate, 0)),
             (
                 "steps_per_s_whole",
-                format!("{:.0}", frames.whole_rate(steps)),
+                of_frames(&|frames| frames.whole_rate(steps), 0),
             ),
-            ("frame_p50_ms", format!("{:.3}", frames.wall_ms(0.5))),
-            ("frame_p99_ms", format!("{:.3}", frames.wall_ms(0.99))),
-            ("staged_p50_ms", format!("{:.3}", self.staged.wall_ms(0.5))),
+            ("frame_p50_ms", of_frames(&|frames| frames.wall_ms(0.5), 3)),
+            ("frame_p99_ms", of_frames(&|frames| frames.wall_ms(0.99), 3)),
+            (
+                "staged_p50_ms",
+                or_dash(gpu.map(|gpu| gpu.staged.wall_ms(0.5)), 3),
+            ),
             (
                 "imports",
-                if self.imported.is_some() { "yes" } else { "no" }.to_owned(),
+                yes(gpu.is_some_and(|gpu| gpu.imported.is_some())),
             ),
-            ("submit_us", format!("{:.0}", frames.thread_us(0.5))),
-            ("recorded_us", or_dash(self.replay.map(|r| r[0]), 0)),
-            ("encoded_us", or_dash(self.replay.map(|r| r[1]), 0)),
+            ("submit_us", of_frames(&|frames| frames.thread_us(0.5), 0)),
+            ("recorded_us", or_dash(replay.map(|r| r[0]), 0)),
+            ("encoded_us", or_dash(replay.map(|r| r[1]), 0)),
             (
                 "encoded_over_recorded",
-                or_dash(self.replay.map(|r| r[1] / r[0]), 1),
+                or_dash(replay.map(|r| r[1] / r[0]), 1),
             ),
-            ("frames", frames.len().to_string()),
-            ("cut", if frames.is_cut { "yes" } else { "no" }.to_owned()),
+            ("frames", measured.map_or(0, Frames::len).to_string()),
+            ("cut", yes(measured.is_some_and(|frames| frames.is_cut))),
             ("cpu_steps_per_s", or_dash(cpu, 0)),
             (
                 "gpu_over_cpu",
-                or_dash(cpu.map(|cpu| frames.rate(steps) / cpu), 2),
+                or_dash(rate.zip(cpu).map(|(gpu, cpu)| gpu / cpu), 2),
             ),
         ]
     }
 }
 
-/// All rows, and what stands above them.
+/// All rows, what stands above them, and the file that gets them one by one.
 pub struct Report {
     facts: Vec<(String, String)>,
     rows: Vec<Row>,
+    csv: Option<PathBuf>,
 }
 
 impl Report {
-    /// Says what is measured.
-    pub fn new(info: &AdapterInfo, given: &[String]) -> Report {
+    /// Says what is measured. Without `appends` the file begins anew.
+    pub fn new(
+        info: &AdapterInfo,
+        given: &[String],
+        csv: Option<&Path>,
+        appends: bool,
+    ) -> anyhow::Result<Report> {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
         let memory = info.memory.map_or("unknown".to_owned(), |bytes| {
             format!("{:.1} GB", bytes as f64 * 1e-9)
@@ -124,8 +168,14 @@ impl Report {
             println!("{name}: {value}");
         }
         println!();
-        let rows = Vec::new();
-        Report { facts, rows }
+        if let Some(path) = csv.filter(|path| path.exists() && !appends) {
+            fs::remove_file(path).with_context(|| path.display().to_string())?;
+        }
+        Ok(Report {
+            facts,
+            rows: Vec::new(),
+            csv: csv.map(Path::to_owned),
+        })
     }
 
     /// The names of the columns.
@@ -153,7 +203,7 @@ impl Report {
     }
 
     /// Shows and keeps a row.
-    pub fn add(&mut self, row: Row) {
+    pub fn add(&mut self, row: Row) -> anyhow::Result<()> {
         let cells = row.cells();
         let cell = |name: &str| cells.iter().find(|c| c.0 == name).map_or("", |c| &c.1);
         println!(
@@ -175,7 +225,12 @@ impl Report {
             cell("cpu_steps_per_s"),
             cell("gpu_over_cpu")
         );
+        if let Some(path) = &self.csv {
+            self.keep(&cells, path)
+                .with_context(|| path.display().to_string())?;
+        }
         self.rows.push(row);
+        Ok(())
     }
 
     /// What to know of the columns.
@@ -187,35 +242,43 @@ impl Report {
              submit: processor time of the thread that asks for a frame; `replay`: the same for 64 worlds with batches encoded each time, over that with recorded ones.\n\
              CPU: the same worlds, commands and fields on all cores of this machine, f32 as well; ratio: the GPU's steps/s over the CPU's."
         );
-        for row in self.rows.iter().filter(|row| row.frames().is_cut) {
-            let (scene, frames) = (row.scene.name(), row.frames().len());
-            println!(
-                "{scene} with {} worlds: too slow for a whole run, {frames} frames",
-                row.worlds
-            );
+        for row in &self.rows {
+            let gpu = row.gpu.as_ref().map(GpuSide::frames);
+            for frames in gpu.into_iter().chain(&row.cpu).filter(|f| f.is_cut) {
+                let (scene, worlds, frames) = (row.scene.name(), row.worlds, frames.len());
+                println!("{scene} with {worlds} worlds: too slow for a whole run, {frames} frames");
+            }
+        }
+        if let Some(path) = &self.csv {
+            println!("\nresults: {}", path.display());
         }
     }
 
-    /// Writes the file.
-    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
+    /// Adds a row to the file, below the facts and the names of the columns.
+    fn keep(&self, cells: &[Cell], path: &Path) -> anyhow::Result<()> {
+        let (names, values): (Vec<_>, Vec<&str>) =
+            cells.iter().map(|(name, value)| (*name, &**value)).unzip();
+        let names = names.join(",");
         let mut text = String::new();
-        for (name, value) in &self.facts {
-            text += &format!("# {name}: {value}\n");
-        }
-        for (k, row) in self.rows.iter().enumerate() {
-            let (names, values): (Vec<_>, Vec<_>) = row.cells().into_iter().unzip();
-            if k == 0 {
-                text += &(names.join(",") + "\n");
+        if !path.exists() {
+            if let Some(folder) = path.parent() {
+                fs::create_dir_all(folder)?;
             }
-            text += &(values.join(",") + "\n");
+            for (name, value) in &self.facts {
+                text += &format!("# {name}: {value}\n");
+            }
+            text += &(names + "\n");
+        } else {
+            let there = fs::read_to_string(path)?;
+            let head = there.lines().find(|line| !line.starts_with('#'));
+            ensure!(
+                head == Some(&names),
+                "it has other columns; delete it, or leave `--append` out"
+            );
         }
-        let path_name = || format!("{}", path.display());
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).with_context(path_name)?;
-        }
-        std::fs::write(path, text).with_context(path_name)?;
-        println!("\nresults: {}", path.display());
-        Ok(())
+        text += &(values.join(",") + "\n");
+        let mut file = OpenOptions::new().create(true).append(true).open(path)?;
+        Ok(file.write_all(text.as_bytes())?)
     }
 }
 

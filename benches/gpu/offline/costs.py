@@ -53,6 +53,9 @@ def costs(kernel: Kernel, arch: str, cache: Path) -> Costs:
         return np.bincount(by_stretch, weights=values, minlength=count)
 
     sizes = [len(block.instructions) for block in found]
+    if 2 * sum(sizes) * sass.BYTES < compiled.code:
+        known = f"{sum(sizes) * sass.BYTES} of {compiled.code} bytes"
+        raise SystemExit(f"{kernel.file}: the ways through its machine code for {arch} are known for {known} only")
     # checks of CUDA's shuffles are no part of what Vulkan's drivers make
     compiled = replace(compiled, code=sum(sizes) * sass.BYTES)
     near, l2, far = (

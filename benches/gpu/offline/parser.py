@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 from .expressions import Reader
 from .tokens import Refused, tokens
 from .tree import (
@@ -110,8 +113,27 @@ def block(reader: Reader, kernel: Kernel, depth: int) -> tuple[Statement, ...]:
     """Takes statements up to the closing bracket, which goes too."""
     found: list[Statement] = []
     while not reader.takes("}"):
-        found.append(statement(reader, kernel, depth))
+        if reader.next.text == "{":
+            found += scope(reader, kernel, depth)
+        else:
+            found.append(statement(reader, kernel, depth))
     return tuple(found)
+
+
+def scope(reader: Reader, kernel: Kernel, depth: int) -> tuple[Statement, ...]:
+    """Takes statements in brackets of their own; the place of the bracket makes their names unique."""
+    place = reader.at
+    reader.skip("{")
+    inside, end = 1, reader.at
+    while inside:
+        inside += {"{": 1, "}": -1}.get(reader.words[end].text, 0)
+        end += 1
+    words = reader.words[place:end]
+    defined = {after.text for word, after in pairwise(words) if word.text in ("let", "var")}
+    reader.words[place:end] = [
+        replace(word, text=f"{word.text}_{place}") if word.text in defined else word for word in words
+    ]
+    return block(reader, kernel, depth)
 
 
 def statement(reader: Reader, kernel: Kernel, depth: int) -> Statement:  # noqa: PLR0911 - a return per kind

@@ -1,8 +1,12 @@
 // Compiles SPIR-V of compute programs with the first Vulkan device, and prints what the driver tells of each:
 //   radv FILE.spv…   →   FILE.spv<TAB>statistic<TAB>value
+//   radv --times FILE.spv…   →   FILE.spv<TAB>cold or cached<TAB>milliseconds
+// Cold: what it takes to make a pipeline. Cached: to make it from data that a pipeline cache gave, as a later launch does.
 // With Mesa's driver for AMD and RADV_FORCE_FAMILY=navi21 no card is needed. Programs bind storage buffers 0 to 7.
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <time.h>
 #include <vulkan/vulkan.h>
 
 enum { BUFFERS = 8, MOST = 64 };
@@ -97,28 +101,71 @@ static void print_statistics(VkDevice device, VkPipeline pipeline, const char* p
         printf("%s\t%s\t%llu\n", path, all[k].name, (unsigned long long)all[k].value.u64);
 }
 
+static VkPipeline make_pipeline(VkDevice device, VkPipelineLayout layout, VkPipelineCache cache,
+                                VkPipelineCreateFlags flags, const char* path) {
+    size_t bytes;
+    uint32_t* words = read_words(path, &bytes);
+    VkShaderModuleCreateInfo module_info = {
+        VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, .codeSize = bytes, .pCode = words};
+    VkShaderModule module;
+    check(vkCreateShaderModule(device, &module_info, NULL, &module), path);
+    VkComputePipelineCreateInfo pipeline_info = {VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                                                 .flags = flags,
+                                                 .stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
+                                                           .stage = VK_SHADER_STAGE_COMPUTE_BIT,
+                                                           .module = module,
+                                                           .pName = "main"},
+                                                 .layout = layout};
+    VkPipeline pipeline;
+    check(vkCreateComputePipelines(device, cache, 1, &pipeline_info, NULL, &pipeline), path);
+    vkDestroyShaderModule(device, module, NULL);
+    free(words);
+    return pipeline;
+}
+
+static VkPipelineCache make_cache(VkDevice device, const void* data, size_t bytes) {
+    VkPipelineCacheCreateInfo info = {
+        VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, .initialDataSize = bytes, .pInitialData = data};
+    VkPipelineCache cache;
+    check(vkCreatePipelineCache(device, &info, NULL, &cache), "vkCreatePipelineCache");
+    return cache;
+}
+
+static double milliseconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return now.tv_sec * 1e3 + now.tv_nsec * 1e-6;
+}
+
+static void* print_time(VkDevice device, VkPipelineLayout layout, const char* path, const char* kind, void* data,
+                        size_t* bytes) {
+    double start = milliseconds();
+    VkPipelineCache cache = make_cache(device, data, *bytes);
+    VkPipeline pipeline = make_pipeline(device, layout, cache, 0, path);
+    printf("%s\t%s\t%.1f\n", path, kind, milliseconds() - start);
+    free(data);
+    check(vkGetPipelineCacheData(device, cache, bytes, NULL), "vkGetPipelineCacheData");
+    data = malloc(*bytes);
+    check(vkGetPipelineCacheData(device, cache, bytes, data), "vkGetPipelineCacheData");
+    vkDestroyPipeline(device, pipeline, NULL);
+    vkDestroyPipelineCache(device, cache, NULL);
+    return data;
+}
+
 int main(int count, char** paths) {
+    int times = count > 1 && strcmp(paths[1], "--times") == 0;
     VkDevice device = open_device();
     VkPipelineLayout layout = make_layout(device);
-    for (int k = 1; k < count; k++) {
-        size_t bytes;
-        uint32_t* words = read_words(paths[k], &bytes);
-        VkShaderModuleCreateInfo module_info = {
-            VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, .codeSize = bytes, .pCode = words};
-        VkShaderModule module;
-        check(vkCreateShaderModule(device, &module_info, NULL, &module), paths[k]);
-        VkComputePipelineCreateInfo pipeline_info = {VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                                                     .flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR,
-                                                     .stage = {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                                               .stage = VK_SHADER_STAGE_COMPUTE_BIT,
-                                                               .module = module,
-                                                               .pName = "main"},
-                                                     .layout = layout};
-        VkPipeline pipeline;
-        check(vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &pipeline_info, NULL, &pipeline), paths[k]);
+    for (int k = 1 + times; k < count; k++) {
+        if (times) {
+            size_t bytes = 0;
+            void* data = print_time(device, layout, paths[k], "cold", NULL, &bytes);
+            free(print_time(device, layout, paths[k], "cached", data, &bytes));
+            continue;
+        }
+        VkPipeline pipeline = make_pipeline(
+            device, layout, VK_NULL_HANDLE, VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR, paths[k]);
         print_statistics(device, pipeline, paths[k]);
         vkDestroyPipeline(device, pipeline, NULL);
-        vkDestroyShaderModule(device, module, NULL);
-        free(words);
     }
 }

@@ -92,6 +92,8 @@ def amd(found: list[Program], scene: str, family: str, of: str) -> list[Row]:
             "spilled_scalars": str(one.spilled_scalars),
             "code_kb": f"{one.code / 1024:.1f}",
             "waves": str(one.waves),
+            "cold_ms": f"{one.cold:.1f}",
+            "cached_ms": f"{one.cached:.1f}",
         }
         for one in found
     ]

@@ -1,0 +1,113 @@
+//! The command line of the bench.
+
+use crate::scenes::Scene;
+use clap::{Parser, ValueEnum};
+use sim_engine::options::Cuts;
+use std::path::PathBuf;
+
+/// Which checks run before anything is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Checks {
+    /// All; then it measures.
+    First,
+    /// All; then it ends.
+    Only,
+    /// None: another call ran them.
+    Skip,
+}
+
+/// Which side is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Side {
+    /// The adapter.
+    Gpu,
+    /// The processor.
+    Cpu,
+    /// The adapter, then the processor.
+    Both,
+}
+
+/// Checks worlds on a GPU, then measures them.
+#[derive(Parser)]
+pub struct Arguments {
+    /// Adapter, by index or by part of its name.
+    #[arg(long)]
+    pub adapter: Option<String>,
+    /// Numbers of worlds.
+    #[arg(long, value_delimiter = ',', default_value = "1024,4096,16384,65536")]
+    pub worlds: Vec<usize>,
+    /// Scenes.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "torque_free,target,grasp,quadruped"
+    )]
+    pub scenes: Vec<Scene>,
+    /// How long each is measured at least [s]; whole runs are.
+    #[arg(long, default_value_t = 2.0)]
+    pub seconds: f64,
+    /// File for the results; a row is there as soon as it is measured.
+    #[arg(long)]
+    pub csv: Option<PathBuf>,
+    /// Adds rows to that file, instead of beginning anew.
+    #[arg(long, requires = "csv")]
+    pub append: bool,
+    /// Frames are copied by the host, even where the device could write them to their readers.
+    #[arg(long)]
+    pub no_import: bool,
+    /// Which side is measured.
+    #[arg(long, value_enum, default_value = "both")]
+    pub side: Side,
+    /// Which checks run.
+    #[arg(long, value_enum, default_value = "first")]
+    pub checks: Checks,
+    /// Numbers of worlds between which a world must have the same bits, besides 1 and 7. 4031 is no whole number of workgroups.
+    #[arg(long, value_delimiter = ',', default_value = "4031")]
+    pub check_worlds: Vec<usize>,
+    /// Leaves out what needs more builds: cold and cached ones, and the comparison of recorded with encoded batches.
+    #[arg(long)]
+    pub brief: bool,
+    /// Folder that keeps programs from call to call.
+    #[arg(long)]
+    pub cache: Option<PathBuf>,
+    /// Threads that share a world where contacts can be; else what suits the adapter.
+    #[arg(long)]
+    pub world_threads: Option<usize>,
+    /// Largest kernel, in simple statements; else what suits the adapter.
+    #[arg(long)]
+    pub kernel_size: Option<usize>,
+    /// Price of one more dispatch, in simple statements; else what suits the adapter.
+    #[arg(long)]
+    pub dispatch_price: Option<usize>,
+    /// What else the head of the file says, as `name: value`.
+    #[arg(long)]
+    pub fact: Vec<String>,
+    /// Writes the kernels of the scenes and states of their runs to this folder, without a GPU: benches/gpu/offline reads them.
+    #[arg(long)]
+    pub dump: Option<PathBuf>,
+    /// Frames before and after which the states are written.
+    #[arg(long, value_delimiter = ',', default_value = "40")]
+    pub frames: Vec<usize>,
+    /// Writes the kernels of the software driver, not those of hardware.
+    #[arg(long)]
+    pub software: bool,
+    /// Threads that share a world, where contacts can be.
+    #[arg(long, default_value_t = 8)]
+    pub lanes: usize,
+    /// The adapter steps the worlds of the dump, not the CPU.
+    #[arg(long)]
+    pub on_adapter: bool,
+    /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
+    #[arg(long, hide = true)]
+    pub build_in: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Where kernels are cut.
+    pub fn cuts(&self) -> Cuts {
+        Cuts {
+            kernel: self.kernel_size,
+            dispatch: self.dispatch_price,
+        }
+    }
+}

@@ -1,0 +1,34 @@
+#!/bin/sh
+# Puts what a machine with a GPU and no network needs into a folder below 40 MB: card.sh says how to use it.
+#
+#   benches/gpu/card_folder.sh FOLDER [WHEEL...]
+#
+# It takes the built gpu_bench, the wheel of .venv, and other wheels, such as those of mujoco and mujoco-mjx for the machine's Python.
+set -eu
+folder=$1
+shift
+cd "$(dirname "$0")/../.."
+most=40 # [MB]
+rm -rf "$folder"
+mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/results" "$folder/examples" "$folder/tests/python/mujoco"
+strip -o "$folder/gpu_bench" "${CARGO_TARGET_DIR:-target}/release/examples/gpu_bench"
+gzip -6 "$folder/gpu_bench"
+cp .venv/wheels/*.whl "$@" "$folder/wheels"
+# the loader of this computer, for machines that have a driver without one
+loader=$(ldconfig -p | awk '/libvulkan\.so\.1 / {print $NF; exit}')
+[ -z "$loader" ] || cp -L "$loader" "$folder/lib/libvulkan.so.1"
+cp benches/gpu/card.sh "$folder"
+cp benches/gpu/card_report.py benches/gpu/peers.py benches/gpu/tensors.py benches/gpu/published.csv "$folder/benches/gpu"
+cp -r benches/results/gpu_offline "$folder/benches/results"
+# what peers.py imports, and the robots of these
+cp -r benches/contacts.py benches/legged.py benches/record.py benches/robots "$folder/benches"
+cp -rL examples/franka_grasp.py examples/franka_lesson.py examples/assets "$folder/examples"
+cp tests/python/mujoco/mujoco_model.py "$folder/tests/python/mujoco"
+cp -r tests/data "$folder/tests"
+git describe --always --dirty '--exclude=*' >"$folder/commit"
+size=$(du -sm --apparent-size "$folder" | cut -f1)
+if [ "$size" -ge "$most" ]; then
+  echo "$folder has $size MB, and must stay below $most: give fewer wheels" >&2
+  exit 1
+fi
+echo "$folder: $size MB; copy it to the machine and run $(basename "$folder")/card.sh there"
