@@ -44,6 +44,7 @@ pub struct Model {
     pub(crate) sensors: Vec<SensorInfo>,
     pub(crate) refused_sensors: Vec<String>,
     pub(crate) site_names: Vec<String>,
+    pub(crate) mujoco_site_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
     pub(crate) robots: Vec<RobotRange>,
@@ -174,6 +175,10 @@ impl Model {
     /// Names of the sites.
     pub fn site_names(&self) -> &[String] {
         &self.site_names
+    }
+    /// Names of the sites of MuJoCo models, `robot/site`.
+    pub fn mujoco_site_names(&self) -> &[String] {
+        &self.mujoco_site_names
     }
     /// What each contact sensor adds up.
     pub fn contact_sensors(&self) -> &[SensedShapes] {

@@ -4,6 +4,7 @@
 
 mod bodies;
 mod error;
+mod ik;
 mod mujoco;
 mod number;
 mod parts;
@@ -21,6 +22,7 @@ mod surface;
 
 pub use bodies::BodyTable;
 pub use error::ConfigError;
+pub use ik::{IkReach, IkTask};
 pub use mujoco::{MujocoTable, mujoco_summary};
 pub use number::{Number, PerDof};
 pub use parts::Parts;
@@ -34,10 +36,14 @@ pub use shapes::{ShapeName, ShapeTable};
 pub use sim_engine::backend::BackendError;
 pub use sim_engine::dynamics::Dynamics;
 pub use sim_engine::random::{Draw, Stream, TASK_STREAMS};
-pub use sim_model::Pose;
+pub use sim_ik::{
+    IkError, Options as IkOptions, Precision as IkPrecision, Problems as IkProblems,
+    Solution as IkSolution, Solver as IkSolver, Width as IkWidth, frame_names,
+};
 pub use sim_model::UrdfOptions;
 pub use sim_model::geometry::{Image, MeshOptions, Texture, VisualMesh};
 pub use sim_model::ray_scene::{Casting, Hits, Placed, Ray, RayGeom, RayScene};
+pub use sim_model::{Model, Pose};
 pub use sim_physics::arrays::Field;
 pub(crate) use summary::{joint_type, mesh_properties, robot_summary};
 pub use summary::{mesh_summary, urdf_summary};

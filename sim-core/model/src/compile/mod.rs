@@ -210,6 +210,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         sensors: builder.sensors,
         refused_sensors: builder.refused_sensors,
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
+        mujoco_site_names: mujoco_site_names(scene),
         contact_sensors: sensors,
         command_delay_max: scene.delay_max(),
         robots: builder.robots,
@@ -222,6 +223,17 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     };
     model.hash = model.own_hash();
     Ok(model)
+}
+
+/// Names of the sites of MuJoCo models, in the order of their frames.
+fn mujoco_site_names(scene: &Description) -> Vec<String> {
+    let robots = scene.robots.iter();
+    let sites = robots.flat_map(|robot| {
+        let parts = robot.mujoco.iter();
+        let names = parts.flat_map(|parts| &parts.frames.site_names);
+        names.map(|name| format!("{}/{name}", robot.name))
+    });
+    sites.collect()
 }
 
 /// Puts MuJoCo's inverse weights in the place of ours, for the robots that it compiled.

@@ -39,33 +39,55 @@ impl Stage for Kinematics {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for (t, tree) in m.trees.iter().enumerate() {
-            b.work.reference[t] = Vec3::constant(tree.base);
-        }
+        place_bases(m, b);
         // parents precede children (sim-model sorts them), so one forward pass suffices
         for (k, body) in m.bodies.iter().enumerate() {
-            let (rest, place) = at_zero(b, body);
-            let place = slid(cx, b, body, rest, place);
-            let origin = match body.parent {
-                Some(parent) => b.work.origin[parent] + place,
-                None => place,
-            };
-            let (rotation, origin) = moved(cx, b, body, rest, origin);
+            let place = place_body(cx, m, b, k);
+            let origin = b.work.origin[k];
             let from_point = match body.motion {
                 Motion::Free => origin,
                 _ => Vec3::zero(),
             };
-            b.work.rotation[k] = rotation;
-            b.work.origin[k] = origin;
             b.work.arm[k] = match body.parent {
                 // its point is the reference point
                 Some(parent) if m.bodies[parent].motion == Motion::Free => origin,
                 Some(_) => place,
                 None => origin - from_point,
             };
+            let rotation = b.work.rotation[k];
             b.work.inertia[k] = inertia(m, &b.params, body, &rotation, from_point);
         }
     }
+}
+
+/// Writes the reference points of robots that are fixed to the world.
+#[inline(always)]
+pub fn place_bases<F: Num, V>(m: &Constants<F::Real>, b: &mut Block<F, V>) {
+    for (t, tree) in m.trees.iter().enumerate() {
+        b.work.reference[t] = Vec3::constant(tree.base);
+    }
+}
+
+/// Writes the frame and the motion axes of a body whose parent is placed. Returns its origin from that of its carrier, or from
+/// the base.
+#[inline(always)]
+pub fn place_body<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    k: usize,
+) -> Vec3<C::F> {
+    let body = &m.bodies[k];
+    let (rest, place) = at_zero(b, body);
+    let place = slid(cx, b, body, rest, place);
+    let origin = match body.parent {
+        Some(parent) => b.work.origin[parent] + place,
+        None => place,
+    };
+    let (rotation, origin) = moved(cx, b, body, rest, origin);
+    b.work.rotation[k] = rotation;
+    b.work.origin[k] = origin;
+    place
 }
 
 /// Axes of a body whose joint is at 0, and its origin from that of its carrier, or from the base.

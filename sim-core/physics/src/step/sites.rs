@@ -120,7 +120,7 @@ fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 
 /// Position of a mount, from the reference point of its robot.
 #[inline(always)]
-pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+pub fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     let own = Vec3::constant(mount.position);
     match mount.body {
         Some(body) => w.rotation[body].mul_add(own, w.origin[body]),
@@ -130,7 +130,7 @@ pub(super) fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3
 
 /// The reference point of a mount's robot.
 #[inline(always)]
-pub(super) fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
+pub fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
     match mount.tree {
         Some(tree) => w.reference[tree],
         None => Vec3::zero(),
@@ -165,7 +165,7 @@ pub(super) fn velocity<F: Num>(
 
 /// Axes of a mount in the world, by columns.
 #[inline(always)]
-pub(super) fn axes<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Mat3<F> {
+pub fn axes<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Mat3<F> {
     let own = Mat3::constant(mount.rotation);
     match mount.body {
         Some(body) => {

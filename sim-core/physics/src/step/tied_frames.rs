@@ -123,7 +123,7 @@ fn moving<F: Num>(
             acceleration: Spatial::zero(),
         };
     };
-    let (omega, acceleration) = (w.velocity[body][ANGULAR], w.force[body]);
+    let (omega, acceleration) = (w.velocity[body][ANGULAR], w.rest_acceleration[body]);
     // from the body's own point, see `kinematics`
     let arm = match m.bodies[body].motion {
         Motion::Free => placed.point,

@@ -1,0 +1,199 @@
+//! Inverse kinematics as a command: a file asks, and the answer takes its place.
+//!
+//! ```text
+//! question   length u64 · JSON of that length, a [`Question`] · f64 of its arrays, one after another
+//! answer     f64 per problem: joint positions, then 1 if solved, errors of position [m] and rotation [rad], iterations, restarts
+//! ```
+//! Everything is little endian. The worlds start at their positions unless the question has others. No world moves.
+
+use std::fs::OpenOptions;
+use std::io::{Read, Seek, Write};
+
+use serde::Deserialize;
+use sim_engine::simulation::Simulation;
+use sim_ik::{IkError, Options, Precision, Problems, Solution, Solver, Width};
+use sim_protocol::RefusalKind;
+use sim_protocol::host::Inbox;
+
+use crate::config::IkTask;
+use crate::refusal::{Refusal, refusal};
+use crate::snapshot;
+
+/// What a file asks for, beside its arrays.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Question {
+    task: IkTask,
+    /// Problems.
+    count: usize,
+    /// Lengths of the arrays: starts (0 for the worlds' positions), references of the posture, then of each frame its positions
+    /// and its quaternions.
+    lengths: Vec<usize>,
+    iterations: usize,
+    restarts: usize,
+    seed: u64,
+    tolerance: [f64; 2],
+    double: bool,
+    /// 0 for those of the simulation.
+    threads: usize,
+}
+
+/// The solver of the last question: a control loop asks the same task again and again.
+#[derive(Default)]
+pub(crate) struct Ik {
+    last: Option<(String, Solver)>,
+}
+
+impl Ik {
+    /// Answers the question in the file that the command names.
+    pub(crate) fn answer(&mut self, simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal> {
+        let path = snapshot::path(inbox)?;
+        let refuse = |problem: String| refused(&format!("{}: {problem}", path.display()));
+        let opened = OpenOptions::new().read(true).write(true).open(path);
+        let mut file = opened.map_err(|problem| refuse(format!("cannot be opened: {problem}")))?;
+        let status = file
+            .metadata()
+            .map_err(|problem| refuse(problem.to_string()))?;
+        if !status.is_file() {
+            return Err(refuse("is no file; give the path of one".to_owned()));
+        }
+        snapshot::check_room(3 * status.len()).map_err(refuse)?;
+        let mut bytes = Vec::with_capacity(status.len() as usize);
+        let read = (&file).take(status.len()).read_to_end(&mut bytes);
+        read.map_err(|problem| refuse(format!("cannot be read: {problem}")))?;
+        let answer = self.solve(simulation, &bytes);
+        let answer = answer.map_err(|problem| refused(&problem))?;
+        let written = file
+            .rewind()
+            .and_then(|()| file.set_len(0))
+            .and_then(|()| file.write_all(&answer));
+        written.map_err(|problem| refuse(format!("cannot be written: {problem}")))
+    }
+
+    fn solve(&mut self, simulation: &Simulation, bytes: &[u8]) -> Result<Vec<u8>, String> {
+        let (question, task, arrays) =
+            parse(bytes).ok_or("the file is no question; use sim.ik")??;
+        let [starts, posture, targets @ ..] = &arrays[..] else {
+            return Err("the question lacks arrays; use sim.ik".to_owned());
+        };
+        let present = match starts[..] {
+            [] => simulation.positions(),
+            _ => Vec::new(),
+        };
+        let starts = if starts.is_empty() { &present } else { starts };
+        let coords = simulation.model().coords();
+        let has_rows = |array: &Vec<f64>| array.len() >= question.count;
+        // so that no count asks for more memory than its arrays
+        if question.count != 1 && !has_rows(starts) && !targets.iter().any(has_rows) {
+            return Err(format!(
+                "the question has no array of {} problems; give as many as arrays have",
+                question.count
+            ));
+        }
+        let solver = self
+            .solver(simulation, &question.task, task)
+            .map_err(said)?;
+        let problems = Problems {
+            count: question.count,
+            starts,
+            postures: posture,
+            positions: targets.iter().step_by(2).map(Vec::as_slice).collect(),
+            orientations: targets
+                .iter()
+                .skip(1)
+                .step_by(2)
+                .map(Vec::as_slice)
+                .collect(),
+        };
+        let options = Options {
+            iterations: question.iterations.max(1),
+            restarts: question.restarts,
+            tolerance: question.tolerance,
+            seed: question.seed,
+        };
+        let precision = if question.double {
+            Precision::F64
+        } else {
+            Precision::F32
+        };
+        let threads = match question.threads {
+            0 => simulation.threads(),
+            asked => asked,
+        };
+        let solved = solver.solve(&problems, options, precision, Width::Auto, threads);
+        let (joint_q, solutions) = solved.map_err(said)?;
+        Ok(rows(coords, &joint_q, &solutions))
+    }
+
+    /// The solver of a task; `text` is what it was read from.
+    fn solver(
+        &mut self,
+        simulation: &Simulation,
+        task: &IkTask,
+        text: &str,
+    ) -> Result<&Solver, IkError> {
+        if self.last.as_ref().is_none_or(|(last, _)| last != text) {
+            let solver = task.solver(simulation.model())?;
+            self.last = Some((text.to_owned(), solver));
+        }
+        Ok(&self.last.as_ref().expect("it was just made").1)
+    }
+}
+
+/// A question, the text of its task, and its arrays; none for other bytes.
+#[allow(clippy::type_complexity)]
+fn parse(bytes: &[u8]) -> Option<Result<(Question, &str, Vec<Vec<f64>>), String>> {
+    let (head, rest) = bytes.split_first_chunk::<8>()?;
+    let (json, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*head)).ok()?)?;
+    let text = std::str::from_utf8(json).ok()?;
+    let question: Question = match serde_json::from_str(text) {
+        Ok(question) => question,
+        Err(problem) => {
+            return Some(Err(format!(
+                "the file is no question: {problem}; use sim.ik"
+            )));
+        }
+    };
+    let (numbers, end) = rest.as_chunks::<8>();
+    let mut numbers = numbers.iter().map(|&bytes| f64::from_le_bytes(bytes));
+    let wanted = question
+        .lengths
+        .iter()
+        .try_fold(0usize, |sum, &n| sum.checked_add(n))?;
+    if !end.is_empty() || wanted != numbers.len() {
+        return None;
+    }
+    let lengths = question.lengths.iter();
+    let arrays = lengths.map(|&length| numbers.by_ref().take(length).collect());
+    let arrays = arrays.collect();
+    // the task comes first: what follows differs from call to call
+    let task = text.split_once(",\"count\"").map_or(text, |(task, _)| task);
+    Some(Ok((question, task, arrays)))
+}
+
+/// The answer.
+fn rows(coords: usize, joint_q: &[f64], solutions: &[Solution]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(8 * (coords + 5) * solutions.len());
+    for (k, one) in solutions.iter().enumerate() {
+        let found = [
+            f64::from(u8::from(one.is_solved)),
+            one.position_error,
+            one.rotation_error,
+            f64::from(one.iterations),
+            f64::from(one.restarts),
+        ];
+        let q = &joint_q[k * coords..(k + 1) * coords];
+        for number in q.iter().chain(&found) {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+fn said(error: IkError) -> String {
+    error.to_string()
+}
+
+fn refused(problem: &str) -> Refusal {
+    refusal(RefusalKind::Backend, format!("ik: {problem}"))
+}
