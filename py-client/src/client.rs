@@ -1,12 +1,15 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
 use std::ops::ControlFlow;
+use std::os::fd::{IntoRawFd, RawFd};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_protocol::{AttachOptions, Client as Connection, Description, Hook, ProtocolError};
+use sim_protocol::{
+    AttachOptions, Client as Connection, Description, Hook, OnDevice, ProtocolError,
+};
 
 use crate::advice::Advice;
 use crate::errors::{protocol, raise};
@@ -21,6 +24,8 @@ pub(crate) struct Client {
     connection: Mutex<Option<Arc<Connection>>>,
     process: u32,
     advice: Advice,
+    /// `tightloop.card.Card`, once frames and commands stay on the GPU.
+    card: Mutex<Option<Py<PyAny>>>,
 }
 
 #[pymethods]
@@ -42,7 +47,28 @@ impl Client {
             advice: Advice::new(connection.description()),
             connection: Mutex::new(Some(connection.into())),
             process: std::process::id(),
+            card: Mutex::default(),
         })
+    }
+
+    /// Device memory of the daemon as JSON, and its file descriptors, which are the caller's to close.
+    fn device_memory(&self, py: Python<'_>) -> PyResult<(String, Vec<RawFd>)> {
+        let connection = self.connection(py)?;
+        let (memory, descriptors) = self.waiting(py, |hook| connection.device_memory(hook))?;
+        let memory = serde_json::to_string(&memory).expect("it is plain data");
+        let descriptors = descriptors.into_iter().map(IntoRawFd::into_raw_fd);
+        Ok((memory, descriptors.collect()))
+    }
+
+    /// Wait until the daemon reads no commands of an earlier step.
+    fn land(&self, py: Python<'_>) -> PyResult<()> {
+        let connection = self.connection(py)?;
+        self.waiting(py, |hook| connection.land(hook))
+    }
+
+    /// Frames from now on are on this `tightloop.card.Card` too.
+    fn keep_on(&self, card: Py<PyAny>) {
+        *self.card.lock().unwrap_or_else(PoisonError::into_inner) = Some(card);
     }
 
     /// What the daemon tells about itself, as JSON.
@@ -50,6 +76,14 @@ impl Client {
         serde_json::to_string(&*self.description).expect("a description is plain data")
     }
 
+    /// How frames kept their pace, as JSON; with ``clear`` it is counted anew.
+    fn timing(&self, py: Python<'_>, clear: bool) -> PyResult<String> {
+        let connection = self.connection(py)?;
+        let timing = self.waiting(py, |hook| connection.timing(clear, hook))?;
+        Ok(serde_json::to_string(&timing).expect("it is plain data"))
+    }
+
+    #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
     fn step(
         &self,
         py: Python<'_>,
@@ -58,15 +92,20 @@ impl Client {
         joint_target_qd: Option<&Bound<'_, PyAny>>,
         ctrl: Option<&Bound<'_, PyAny>>,
         more: &Bound<'_, PyDict>,
+        on_device: Option<(u64, u64)>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
         self.advice.step(py, &self.description, &commands)?;
-        let frame = self.waiting(py, |hook| connection.step(&commands, hook))?;
-        self.advice.frame(py, &self.description, frame)
+        let frame = self.waiting(py, |hook| match on_device {
+            None => connection.step(&commands, hook),
+            Some(left) => connection.step_on_device(&commands, as_left(left), hook),
+        })?;
+        self.advised(py, frame)
     }
 
+    #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
     fn send(
         &self,
         py: Python<'_>,
@@ -75,18 +114,22 @@ impl Client {
         joint_target_qd: Option<&Bound<'_, PyAny>>,
         ctrl: Option<&Bound<'_, PyAny>>,
         more: &Bound<'_, PyDict>,
+        on_device: Option<(u64, u64)>,
     ) -> PyResult<()> {
         let connection = self.connection(py)?;
         let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
         let commands = inputs.commands()?;
         self.advice.step(py, &self.description, &commands)?;
-        self.waiting(py, |hook| connection.send(&commands, hook))
+        self.waiting(py, |hook| match on_device {
+            None => connection.send(&commands, hook),
+            Some(left) => connection.send_on_device(&commands, as_left(left), hook),
+        })
     }
 
     fn recv(&self, py: Python<'_>) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let frame = self.waiting(py, |hook| connection.recv(hook))?;
-        self.advice.frame(py, &self.description, frame)
+        self.advised(py, frame)
     }
 
     fn write(
@@ -161,6 +204,11 @@ impl Client {
     fn snapshot(&self, py: Python<'_>, path: &str) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         self.frame(py, |hook| connection.snapshot(path, hook))
+    }
+
+    fn ik(&self, py: Python<'_>, path: &str) -> PyResult<PyFrame> {
+        let connection = self.connection(py)?;
+        self.frame(py, |hook| connection.ik(path, hook))
     }
 
     fn restore(
@@ -264,7 +312,31 @@ impl Client {
     where
         F: FnOnce(Hook<'_>) -> Result<sim_protocol::Frame, ProtocolError> + Send,
     {
-        PyFrame::new(py, self.waiting(py, call)?)
+        // only steps order themselves after what the card does
+        if let Some(card) = self.card(py) {
+            card.call_method0(py, "synchronize")?;
+        }
+        let frame = PyFrame::new(py, self.waiting(py, call)?)?;
+        self.on_card(py, &frame);
+        Ok(frame)
+    }
+
+    /// The frame of a step, after warnings of its values.
+    fn advised(&self, py: Python<'_>, frame: sim_protocol::Frame) -> PyResult<PyFrame> {
+        let frame = self.advice.frame(py, &self.description, frame)?;
+        self.on_card(py, &frame);
+        Ok(frame)
+    }
+
+    fn on_card(&self, py: Python<'_>, frame: &PyFrame) {
+        if let Some(card) = self.card(py) {
+            frame.put_on(py, &card);
+        }
+    }
+
+    fn card(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        let card = self.card.lock().unwrap_or_else(PoisonError::into_inner);
+        card.as_ref().map(|card| card.clone_ref(py))
     }
 
     /// Runs a call that may wait. Of one that fails after a signal handler or another thread closed the simulation, that
@@ -279,6 +351,11 @@ impl Client {
             failure => failure.raised(py),
         })
     }
+}
+
+/// What a step takes from device memory.
+fn as_left((ready, commands): (u64, u64)) -> OnDevice {
+    OnDevice { ready, commands }
 }
 
 /// Why a call that waits ended without a result.

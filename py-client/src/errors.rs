@@ -38,6 +38,7 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
             "CommandRefused"
         }
         SharedMemory { .. } | Memory { .. } | Descriptors { .. } => "ResourceError",
+        NotShared { .. } => "GpuMemoryError",
         Timeout { .. } | Silent { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",
         _ => "TransportError",

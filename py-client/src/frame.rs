@@ -1,6 +1,6 @@
 //! Frames: read-only NumPy views of shared memory that keep their sample alive.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use numpy::ndarray::{ArrayViewD, IxDyn};
 use numpy::npyffi::flags::NPY_ARRAY_WRITEABLE;
@@ -33,6 +33,8 @@ pub(crate) struct PyFrame {
     // not the frame itself, which keeps the arrays made so far: that would be a circle
     sample: Py<Sample>,
     arrays: Mutex<Made>,
+    /// `tightloop.card.Card`, if the frame is on the card too.
+    card: OnceLock<Py<PyAny>>,
 }
 
 #[pymethods]
@@ -81,6 +83,16 @@ impl PyFrame {
         Err(raise(py, "CommandRefused", problem.to_owned()))
     }
 
+    /// The field as a tensor of torch on the simulation's GPU, in the memory that the daemon writes.
+    fn torch<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        Self::on_card(slf, name, "torch")
+    }
+
+    /// The field on the simulation's GPU with ``__cuda_array_interface__`` and ``__dlpack__``.
+    fn cuda<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        Self::on_card(slf, name, "array")
+    }
+
     /// The frame's arrays in memory of their own, as attributes of the same names. Takes no slot.
     fn copy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let arrays = PyDict::new(py);
@@ -114,7 +126,7 @@ impl PyFrame {
 
     fn __dir__(&self, py: Python<'_>) -> Vec<String> {
         let mut names = self.fields(py);
-        names.extend(["copy", "fields"].map(str::to_owned));
+        names.extend(["copy", "cuda", "fields", "torch"].map(str::to_owned));
         names
     }
 
@@ -132,7 +144,39 @@ impl PyFrame {
         Ok(PyFrame {
             sample: Py::new(py, Sample(frame))?,
             arrays: Mutex::default(),
+            card: OnceLock::new(),
         })
+    }
+
+    /// Notes the card that has the frame too, if it has.
+    pub(crate) fn put_on(&self, py: Python<'_>, card: &Py<PyAny>) {
+        if self.sample.bind(py).get().0.header().slot > 0 {
+            let _ = self.card.set(card.clone_ref(py));
+        }
+    }
+
+    /// An array of the card, made by a method of `tightloop.card.Card`, which holds on to the sample.
+    fn on_card<'py>(
+        slf: &Bound<'py, Self>,
+        name: &str,
+        method: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, own) = (slf.py(), slf.get());
+        let sample = own.sample.bind(py);
+        let frame = &sample.get().0;
+        if frame.field(name).is_err() {
+            return Err(own.unknown(py, name)?);
+        }
+        let Some(card) = own.card.get() else {
+            let problem = format!(
+                "`{name}` of this frame is not on a GPU that this process sees: call `sim.keep_on_gpu()` once after the \
+                 launch, and take the tensors of frames that come after it"
+            );
+            return Err(raise(py, "GpuMemoryError", problem));
+        };
+        let header = frame.header();
+        let arguments = (sample, name, header.slot - 1, header.done);
+        card.bind(py).call_method1(method, arguments)
     }
 
     /// The same frame as another object.
@@ -140,6 +184,7 @@ impl PyFrame {
         PyFrame {
             sample: frame.get().sample.clone_ref(frame.py()),
             arrays: Mutex::default(),
+            card: OnceLock::new(),
         }
     }
 

@@ -9,6 +9,7 @@ mod client;
 mod dynamics;
 mod errors;
 mod frame;
+mod ik;
 mod input;
 mod not_finite;
 mod observe;
@@ -58,6 +59,8 @@ mod core {
     use super::dynamics::Dynamics;
     #[pymodule_export]
     use super::frame::{PyFrame, Sample};
+    #[pymodule_export]
+    use super::ik::Ik;
     #[pymodule_export]
     use super::observe::{Evaluation, Playback};
     #[pymodule_export]

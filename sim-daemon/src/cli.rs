@@ -82,6 +82,12 @@ pub(crate) enum CliCommand {
         #[arg(long, conflicts_with = "names")]
         json: bool,
     },
+    /// Watch a daemon: steps per second, percentiles of frames, clients, faulted worlds, contacts, memory.
+    ///
+    /// Percentiles are those since the daemon started, or since a client counted anew.
+    ///
+    /// Example: tightloop top franka
+    Top(Top),
     /// Stop a daemon with all its groups, and wait until it has ended.
     ///
     /// Example: tightloop stop franka
@@ -122,7 +128,7 @@ pub(crate) struct Serve {
     #[arg(long, default_value_t = 1)]
     pub(crate) groups: u64,
 
-    /// Where the physics runs: cpu, gpu, or auto for a hardware GPU from 1024 worlds on, and the CPU otherwise.
+    /// Where the physics runs: cpu, gpu, or auto for the faster of both, measured at the first launch from 128 worlds on.
     #[arg(long, default_value = "auto")]
     pub(crate) device: String,
 
@@ -175,6 +181,31 @@ pub(crate) struct Serve {
     /// after MuJoCo's mj_step.
     #[arg(long, default_value = "frame")]
     pub(crate) outputs_at: String,
+
+    /// Keep to real time: simulated seconds per second; 1 is real time. A frame then leaves when it is due, not sooner.
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) realtime: Option<f64>,
+
+    /// With --realtime, what worlds do when no command came until their frame is due: pause stands still, hold continues with the
+    /// last commands, stop continues with efforts, controls and velocity targets of zero.
+    #[arg(long, default_value = "pause", requires = "realtime")]
+    pub(crate) late: String,
+
+    /// With --late hold, stop after this time without a command [s].
+    #[arg(long, value_name = "SECONDS", requires = "realtime")]
+    pub(crate) command_timeout: Option<f64>,
+
+    /// Processors that the daemon may run on, separated by commas; default: all.
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) cores: Vec<usize>,
+
+    /// Run with this real-time priority (SCHED_FIFO), 1 to 99, where the system allows it.
+    #[arg(long)]
+    pub(crate) priority: Option<u8>,
+
+    /// Keep the daemon's memory from being swapped out, where the system allows it.
+    #[arg(long)]
+    pub(crate) lock_memory: bool,
 
     /// Most frames that a client can hold at once.
     #[arg(long, default_value_t = 4)]
@@ -281,6 +312,29 @@ pub(crate) struct Bench {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Arguments of `top` as given; `top` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Top {
+    /// Name of the daemon.
+    pub(crate) name: String,
+
+    /// Time between two looks [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    pub(crate) interval: f64,
+
+    /// Stop after this many looks.
+    #[arg(long)]
+    pub(crate) count: Option<u64>,
+
+    /// Print a line of JSON per look.
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Instead, serve the numbers to Prometheus at this address of the loopback interface, such as 127.0.0.1:9400.
+    #[arg(long, value_name = "ADDRESS", conflicts_with_all = ["json", "count", "interval"])]
+    pub(crate) metrics: Option<String>,
 }
 
 /// Arguments of `inspect` as given; `inspect` checks them.

@@ -9,7 +9,7 @@ use sim_protocol::{AttachOptions, Client, keep_waiting};
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
-use crate::{bench, devices, inspect, list, recording, session};
+use crate::{bench, devices, inspect, list, recording, session, top};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -27,6 +27,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         CliCommand::Replay(args) => recording::replay(args),
         CliCommand::Devices => devices::run(),
         CliCommand::List { names, json } => list::run(*names, *json),
+        CliCommand::Top(args) => top::run(args),
         CliCommand::Stop { name } => stop(name),
         CliCommand::Python(command) => command.run(),
         CliCommand::Completions { shell } => cli::completions(*shell),

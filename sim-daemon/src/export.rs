@@ -1,5 +1,6 @@
 //! Between physics and protocol: the only file that knows both sim-core and sim-protocol.
 
+use sim_engine::backend::sharing::SharedMemory;
 use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description as Scene, JointKind, KeyState, Model};
@@ -42,6 +43,30 @@ pub(crate) fn frame_table(layout: &Layout) -> Table {
         (name, dtype(slot.dtype), slot.shape.clone(), slot.offset)
     });
     Table::over_arena(slots, layout.bytes)
+}
+
+/// Memory of a GPU, as clients import it.
+pub(crate) fn device_memory(memory: SharedMemory, layout: &Layout) -> protocol::Delivery {
+    let commands = memory.commands.iter();
+    let commands = commands.map(|command| protocol::DeviceCommand {
+        name: command.input.name().to_owned(),
+        columns: command.columns,
+        offset: command.offset,
+    });
+    let offsets = layout.slots.iter().map(|slot| slot.offset as u64);
+    let there = protocol::DeviceMemory {
+        uuid: memory.uuid.map(|byte| format!("{byte:02x}")).concat(),
+        allocated: memory.allocated,
+        dedicated: memory.dedicated,
+        slots: memory.slots,
+        stride: memory.stride,
+        offsets: offsets.collect(),
+        commands: commands.collect(),
+        host_order: memory.timelines.as_ref().err().cloned(),
+    };
+    let mut descriptors = vec![memory.memory];
+    descriptors.extend(memory.timelines.into_iter().flatten());
+    (there, descriptors)
 }
 
 /// A keyframe, as clients see it.
@@ -191,6 +216,7 @@ pub(crate) fn description(
         },
         draws: options.draws.name().to_owned(),
         outputs_at: options.outputs_at.name().to_owned(),
+        pace: None,
         state_bytes: 0,
         schema: 0,
     }
@@ -366,7 +392,8 @@ pub(crate) fn apply(
                 simulation.write(array, columns, values, masked)?;
             }
         }
-        Op::Forward => {}
+        // the server answers a question before, and moves no world
+        Op::Forward | Op::Ik => {}
         Op::Snapshot => snapshot::save(simulation, inbox)?,
         Op::Restore => snapshot::restore(simulation, inbox, masked)?,
     }

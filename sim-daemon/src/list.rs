@@ -129,7 +129,7 @@ fn ask(name: &str) -> Result<Option<News>, ProtocolError> {
 }
 
 /// How long a process has run, as far as this process sees it.
-fn age(pid: u32) -> Option<Duration> {
+pub(crate) fn age(pid: u32) -> Option<Duration> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let uptime = std::fs::read_to_string("/proc/uptime").ok()?;
     // the name before may have spaces; its start is the 22nd field
@@ -209,7 +209,7 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// A rate with three digits, such as `1.23 M`.
-fn rounded(rate: f64) -> String {
+pub(crate) fn rounded(rate: f64) -> String {
     match rate {
         rate if rate >= 1e6 => format!("{:.3} M", rate / 1e6),
         rate if rate >= 1e3 => format!("{:.1} k", rate / 1e3),
@@ -217,7 +217,8 @@ fn rounded(rate: f64) -> String {
     }
 }
 
-fn in_words(age: Duration) -> String {
+/// A duration in its two largest units.
+pub(crate) fn in_words(age: Duration) -> String {
     match age.as_secs() {
         seconds @ 0..60 => format!("{seconds} s"),
         seconds @ 60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),

@@ -6,9 +6,11 @@ use sim_engine::simulation::Simulation;
 use sim_protocol::host::{Host, Next, Worlds};
 use sim_protocol::{Op, RefusalKind};
 
+use crate::device_memory;
 use crate::error::DaemonError;
 use crate::export::{self, Advance};
 use crate::fault_log::FaultLog;
+use crate::ik::Ik;
 use crate::log::Log;
 use crate::refusal::{Refusal, refusal};
 
@@ -34,7 +36,7 @@ fn serve(
     faults: &mut FaultLog,
 ) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
-    let mut scratch = Vec::new();
+    let (mut scratch, mut ik) = (Vec::new(), Ik::default());
     let mut lease = 0;
     let mut is_reported = false;
     let watched = host.description().watch_worlds;
@@ -50,7 +52,7 @@ fn serve(
                 let started = Instant::now();
                 let mut applied = match lost(simulation) {
                     Some(refusal) => Err(refusal),
-                    None => export::apply(simulation, host.inbox(), &mut mask),
+                    None => apply(simulation, host, &mut mask, &mut ik),
                 };
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
@@ -73,6 +75,25 @@ fn serve(
                 }
                 faults.report(simulation, log, started);
             }
+            Next::Late => {
+                host.give_up();
+                let started = Instant::now();
+                // a lost device has no worlds to advance; whoever commands them next is told
+                if lost(simulation).is_none() && apply(simulation, host, &mut mask, &mut ik).is_ok()
+                {
+                    scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
+                    let mut shown = Shown {
+                        simulation,
+                        advance: Advance::Step,
+                        is_leased: false,
+                        watched,
+                    };
+                    host.advance(&mut scratch, &mut shown);
+                } else {
+                    host.stand_still();
+                }
+                faults.report(simulation, log, started);
+            }
             Next::Observe => {
                 // nobody steps now, so there is time to evaluate what observers have not seen
                 scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
@@ -84,6 +105,9 @@ fn serve(
                 };
                 host.show(&mut scratch, &mut shown);
                 faults.report(simulation, log, Instant::now());
+            }
+            Next::DeviceMemory => {
+                host.deliver(|host| device_memory::share(simulation, host.frame_slots()));
             }
             Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
@@ -97,6 +121,24 @@ fn serve(
             is_reported = true;
         }
     }
+}
+
+/// Sets the inputs of a command, wherever they are, all of them or none.
+fn apply(
+    simulation: &mut Simulation,
+    host: &mut Host,
+    mask: &mut Vec<bool>,
+    ik: &mut Ik,
+) -> Result<Advance, Refusal> {
+    if host.inbox().op() == Op::Ik {
+        ik.answer(simulation, host.inbox())?;
+    }
+    let left = device_memory::receive(simulation, host)?;
+    let advance = export::apply(simulation, host.inbox(), mask)?;
+    if let Some(sharing) = simulation.sharing() {
+        sharing.stage_shared(&left);
+    }
+    Ok(advance)
 }
 
 /// Gives recorders the state of all worlds, as long as there is one: `all` of them, or those who wait for it.
@@ -123,12 +165,19 @@ impl Worlds for Shown<'_> {
             // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written before and
             // after.
             unsafe { self.simulation.import(arena) };
+            if let Some(sharing) = self.simulation.sharing() {
+                sharing.assign_slot(arena);
+            }
         }
         match self.advance {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
         self.simulation.lost().is_none()
+    }
+
+    fn on_device(&mut self) -> Option<(usize, u64)> {
+        self.simulation.sharing()?.slot_shown()
     }
 
     fn state(&mut self, to: &mut [u8]) -> bool {

@@ -24,6 +24,7 @@ use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 use crate::groups;
 use crate::log::{Log, Streams};
+use crate::pace;
 use crate::server;
 use crate::watchdog::Watchdog;
 
@@ -93,6 +94,8 @@ fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<()
             group.table,
             Arc::clone(&stop),
         )?;
+        // again with the memory of the services; what is refused was said above
+        let _ = pace::lock_memory(serve);
         let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.client_cleanup())?;
         door.lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -205,6 +208,7 @@ impl Door<'_> {
 fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     // of each group
     let options = check(serve)?;
+    let refusals = pace::ask_system(serve)?;
     let count = serve.groups as usize;
     let paths = DaemonPaths::new(None, &serve.name)?;
     if paths.is_group() {
@@ -253,7 +257,10 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     // before anything large is taken: memory that is missing kills instead of failing
     check_memory(&announced, &table, Simulation::memory_of(&model, &options))?;
     announced.warnings = advice(&description, &model);
+    announced.pace = pace::pace(serve, model.dt() * model.substeps() as f64)?;
+    announced.notes.extend(refusals);
     let simulations = Simulation::groups(model, &options, count)?;
+    announced.notes.extend(pace::lock_memory(serve));
     announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
     announced.watch_state_bytes = simulations[0].snapshot_bytes(announced.watch_worlds) as u64;
     // again with what observers see, of all groups before the first one opens; the worlds have their memory

@@ -95,7 +95,7 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// Refuses what would not fit: memory that is missing kills instead of failing.
-fn check_room(needed: u64) -> Result<(), String> {
+pub(crate) fn check_room(needed: u64) -> Result<(), String> {
     let free = free_memory();
     if needed > free {
         return Err(format!(
@@ -108,7 +108,7 @@ fn check_room(needed: u64) -> Result<(), String> {
 }
 
 /// The path that a command names.
-fn path(inbox: &Inbox) -> Result<&Path, Refusal> {
+pub(crate) fn path(inbox: &Inbox) -> Result<&Path, Refusal> {
     let malformed = |problem: &str| refusal(RefusalKind::Malformed, problem.to_owned());
     let path = inbox.path().ok_or_else(|| malformed("path is missing"))?;
     let path = std::str::from_utf8(path).map_err(|_| malformed("path is not UTF-8"))?;

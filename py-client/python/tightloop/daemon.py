@@ -40,7 +40,7 @@ class Daemon:
         """
         if not sys.executable:
             raise LaunchError("this Python does not know its own executable; start `tightloop serve` and attach")
-        flags = [f"--{flag}={value}" for flag, value in arguments.items()]
+        flags = [f"--{flag}" if value is True else f"--{flag}={value}" for flag, value in arguments.items()]
         process = subprocess.Popen(
             # without site packages and environment variables: the daemon needs only this package, and starts faster
             [sys.executable, "-I", "-S", str(_PROGRAM), "serve", "-", f"--parent={os.getpid()}", *flags],

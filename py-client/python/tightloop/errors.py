@@ -124,5 +124,9 @@ class FramesHeld(TightloopError, RuntimeError):
     """Too many frames are alive at once: use ``frame.copy()``, or launch with a larger ``frames_held``."""
 
 
+class GpuMemoryError(TightloopError, RuntimeError):
+    """Frames and commands cannot stay on the GPU; the message names what is missing. Arrays of the host work on."""
+
+
 class WaitTimeout(TightloopError, TimeoutError):
     """The daemon is alive but did not answer in time."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.array_libraries import gpu_of
 from tightloop.errors import ArgumentError, CommandRefused
 
 
@@ -154,6 +155,9 @@ def _numpy(what: str, value: Any) -> NDArray[Any]:
     try:
         return np.asarray(value)
     except (ValueError, TypeError):
+        if gpu_of(value) is not None:
+            cure = "`step` takes it after `sim.keep_on_gpu()`; elsewhere give one of the host, such as tensor.cpu()"
+            raise CommandRefused(f"{what} is on a GPU; {cure}") from None
         raise CommandRefused(
             f"{what} is {value!r:.80}; give an array of real numbers, with rows of one length"
         ) from None

@@ -12,6 +12,8 @@ from tightloop.attributes import suggestion
 from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError
 from tightloop.groups import Groups
+from tightloop.realtime import RealTime
+from tightloop.realtime import arguments as realtime_arguments
 from tightloop.scene import Scene
 from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
@@ -33,6 +35,7 @@ def launch(
     on_nan: str = "refuse",
     draws: str = "world",
     outputs_at: str = "frame",
+    realtime: float | RealTime | None = None,
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -56,6 +59,7 @@ def launch(
     on_nan: str = "refuse",
     draws: str = "world",
     outputs_at: str = "frame",
+    realtime: float | RealTime | None = None,
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -79,6 +83,7 @@ def launch(
     on_nan: str = "refuse",
     draws: str = "world",
     outputs_at: str = "frame",
+    realtime: float | RealTime | None = None,
     name: str | None = None,
     log: str | os.PathLike[str] | None = None,
     frames_held: int = 4,
@@ -93,8 +98,9 @@ def launch(
             frame of one while another steps. Each world has the same bits as without groups. Error messages count the
             worlds of their group. If left out, one simulation has all worlds.
         device: ``"cpu"``, ``"gpu"`` for the first GPU, or ``"gpu:1"`` or ``"gpu:nvidia"`` for another, by its number or
-            a part of its name; ``tightloop devices`` lists them. ``"auto"`` uses a hardware GPU for 1024 or more worlds
-            in single precision, and the CPU otherwise. `Sim.device` names the choice.
+            a part of its name; ``tightloop devices`` lists them. ``"auto"`` measures a hardware GPU and the CPU at
+            the first launch of 128 or more worlds in single precision, and uses the faster one. It uses the CPU for
+            others. `Sim.device` names the choice, and ``Sim.info["notes"]`` the rates.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
         threads: Largest number of threads of a step, shared by all groups; all cores if left out.
         fields: Frame fields besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
@@ -118,6 +124,9 @@ def launch(
             before the last substep, or the last of the four points of a Runge-Kutta substep. Positions, velocities,
             activations, commands and counters are those of the frame. Frames of other calls than steps evaluate all
             fields at their state. It saves an evaluation per step, and needs the CPU. ``sensordata`` does not have it.
+        realtime: Keep to real time: simulated seconds per second, so that ``1.0`` is real time, or a `RealTime` with
+            more choices. A step then returns when its frame is due, and `Sim.timing` tells how well that went. If left
+            out, a step returns as soon as it can.
         name: Name of the daemon for `attach`; a unique one if left out. With several groups, each has the name and its
             index, such as ``"franka.0"``. With one group, `attach` returns its `Sim`.
         log: File for the daemon's log, such as the number of faulted worlds, with at most one line per second. If left
@@ -164,7 +173,7 @@ def launch(
     arguments["on-nan"] = checks.text("launch: on_nan", on_nan, error=ArgumentError)
     arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
     arguments["outputs-at"] = checks.text("launch: outputs_at", outputs_at, error=ArgumentError)
-    arguments |= _bounds(bounds)
+    arguments |= _bounds(bounds) | realtime_arguments(realtime)
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:

@@ -16,15 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core, checks, keyframes
 from tightloop._core import Frame
 from tightloop.attributes import Attributes, ByName, nearest
-from tightloop.command_arrays import Command, ready_arrays, step_arrays
+from tightloop.card import KeepsOnGpu
+from tightloop.command_arrays import Command, ready_arrays, step_arguments
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
-from tightloop.frames import FrameCopy
+from tightloop.ik_objectives import Posture, Reach
+from tightloop.ik_of_daemon import IkOfDaemon
+from tightloop.inverse_kinematics import IkSolver
 from tightloop.notebook import Shown
 from tightloop.params import Params
 from tightloop.params_advice import ParamsAdvice
-from tightloop.rays import RayHits, Rays, ray_poses
+from tightloop.planning import Companion, Plans
+from tightloop.rays import CastsRays
+from tightloop.realtime import HasTiming
 from tightloop.sensors import slices_by_name
 from tightloop.signatures import checked_calls
 from tightloop.snapshot import Snapshot, transfer_file
@@ -32,7 +37,7 @@ from tightloop.viewer_process import Viewer
 
 
 @checked_calls
-class Sim(Shown, Attributes):
+class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     """A simulation in a daemon. `launch` and `attach` make it; ``close`` or the end of a ``with`` block closes it.
 
     Attributes:
@@ -63,8 +68,8 @@ class Sim(Shown, Attributes):
         bodies: Slice of each robot's bodies.
         info: The daemon's description of itself, with notes on the scene. ``delivery`` says how frames reach shared
             memory: ``"direct"`` from the CPU, ``"imported"`` if a GPU writes them there, ``"copied"`` if the CPU copies
-            them from the GPU. ``groups`` is the number of groups, ``group`` the index of this one, and ``first_world``
-            the index of its first world among all worlds of the daemon.
+            them from the GPU.
+            ``groups`` is the number of groups, ``group`` this one's index, ``first_world`` that of its first world.
     """
 
     def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
@@ -72,8 +77,8 @@ class Sim(Shown, Attributes):
         self.info: dict[str, Any] = json.loads(client.describe())
         self.name: str = self.info["name"]
         # runs when the last reference is gone, and at interpreter exit
-        self._viewers: list[Viewer] = []
-        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid(), self._viewers)
+        self._companions: list[Companion] = []
+        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid(), self._companions)
         self.pid: int = self.info["pid"]
         self.device: str = self.info["device"]
         self.precision: str = self.info["precision"]
@@ -146,8 +151,8 @@ class Sim(Shown, Attributes):
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        more = step_arrays(self, mocap_pos, mocap_quat, eq_active, body_f)
-        return self._client.step(joint_f, joint_target_q, joint_target_qd, ctrl, more)
+        own, more = (joint_f, joint_target_q, joint_target_qd, ctrl), (mocap_pos, mocap_quat, eq_active, body_f)
+        return self._client.step(*step_arguments(self, own, more))
 
     def send(
         self,
@@ -180,8 +185,8 @@ class Sim(Shown, Attributes):
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        more = step_arrays(self, mocap_pos, mocap_quat, eq_active, body_f)
-        self._client.send(joint_f, joint_target_q, joint_target_qd, ctrl, more)
+        own, more = (joint_f, joint_target_q, joint_target_qd, ctrl), (mocap_pos, mocap_quat, eq_active, body_f)
+        self._client.send(*step_arguments(self, own, more))
 
     def recv(self) -> Frame:
         """Wait for the frame of the step that `send` began. After Ctrl-C it may be called again.
@@ -285,8 +290,7 @@ class Sim(Shown, Attributes):
     def latest(self, timeout: float = 0.0) -> Frame | None:
         """Return the newest observer frame: the first ``info["watch_worlds"]`` worlds, whichever client steps them.
 
-        An observer needs no control of the daemon; the overhead is about 1 % at most. The daemon publishes states after
-        a step 4 to 60 times per second, less often for many worlds, and every state at which the simulation pauses.
+        An observer needs no control and costs 1 % at most. States come 4 to 60 times per second, and at pauses.
 
         Args:
             timeout: How long to wait for one [s].
@@ -388,40 +392,22 @@ class Sim(Shown, Attributes):
         """Compute joint forces for given accelerations and states; see `Dynamics.inverse_dynamics`."""
         return self.dynamics.inverse_dynamics(joint_q, joint_qd, joint_qdd, damping=damping)
 
-    @functools.cached_property
-    def _ray_scene(self) -> Rays:
-        firsts = {name: bodies.start for name, bodies in self.bodies.items()}
-        return Rays(self.info["scene"], self.info["scene_folder"], firsts, len(self.body_names))
-
-    def rays(
+    def ik(
         self,
-        pnt: ArrayLike,
-        vec: ArrayLike,
+        objectives: Reach | Posture | Sequence[Reach | Posture],
         *,
-        geomgroup: ArrayLike | None = None,
-        flg_static: bool = True,
-        bodyexclude: ArrayLike = -1,
-        frame: Frame | FrameCopy | None = None,
-    ) -> RayHits:
-        """Find what rays meet first of the geoms of MuJoCo models, as ``mj_ray`` does, in this process.
+        joints: Sequence[str] | None = None,
+        limits: bool = True,
+    ) -> IkSolver:
+        """Make a solver of inverse kinematics that runs in the daemon; see `tightloop.ik` for the arguments.
 
-        Args:
-            pnt: Origins in the world [m]. It and ``vec`` broadcast to ``(worlds, rays, 3)``: ``(rays, 3)`` counts for
-                all worlds, ``(3,)`` for all rays.
-            vec: Directions; their lengths are the units of the distances.
-            geomgroup: Six flags, which groups of geoms count; all if left out.
-            flg_static: Whether geoms of bodies that are welded to the world count.
-            bodyexclude: Place in `body_names` of a body to pass through, or -1; also one per world or per ray.
-            frame: A frame with ``body_q``, or with ``geom_xpos`` and ``geom_xmat``; that of `forward` if left out.
+        Its problems are the worlds. They start at their present positions, and ``joint_q`` of the result has a row per
+        world. Where no joint is a ball or free, send it as ``joint_target_q``.
 
         Raises:
-            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is an SDF.
-            SceneError: A model's file cannot be read here, or no model of the scene has geoms.
-            UnknownField: The frame has no poses.
+            ArgumentError: An argument is not valid.
         """
-        poses = ray_poses(self.forward() if frame is None else frame)
-        options: dict[str, Any] = {"geomgroup": geomgroup, "flg_static": flg_static, "bodyexclude": bodyexclude}
-        return self._ray_scene.cast(poses, pnt, vec, threads=self.threads, **options)
+        return IkSolver(IkOfDaemon(self._client, self.info), objectives, joints, limits)
 
     def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False, hosts: Sequence[str] = ()) -> Viewer:
         """Open a browser viewer in a separate process, which ends with the simulation.
@@ -445,7 +431,7 @@ class Sim(Shown, Attributes):
         if not self._end.alive:
             raise SimClosed("view: the simulation was closed; launch or attach again")
         viewer = Viewer(self.name, port=port, worlds=worlds, open=open, hosts=hosts)
-        self._viewers.append(viewer)
+        self._companions.append(viewer)
         return viewer
 
     def close(self) -> None:
@@ -487,12 +473,12 @@ class Sim(Shown, Attributes):
         return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
 
 
-def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, viewers: list[Viewer]) -> None:
+def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, companions: list[Companion]) -> None:
     # a forked child must not close what belongs to its parent
     if os.getpid() != owner:
         return
-    for viewer in viewers:
-        viewer.close()
+    for companion in companions:
+        companion.close()
     client.close()
     if daemon is None:
         _core.sweep(name)  # does nothing while the daemon lives

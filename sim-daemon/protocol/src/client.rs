@@ -10,6 +10,7 @@ use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::described;
 use crate::discovery::{AttachOptions, find};
+use crate::forked::Maker;
 use crate::frame::Alive;
 use crate::hook::Hook;
 use crate::journal::Journal;
@@ -18,9 +19,26 @@ use crate::observer::Observer;
 use crate::paths::{DaemonPaths, Presence};
 use crate::transport;
 use crate::turn::{Held, Turn};
-use crate::{Description, Frame, Op, ProtocolError};
+use crate::{Description, Frame, Op, ProtocolError, Timing};
 
 /// A connection to a daemon. All methods take `&self`, from any thread; calls that step wait for each other.
+///
+/// ```no_run
+/// use sim_protocol::{AttachOptions, Client, Command, ProtocolError, Values, keep_waiting};
+///
+/// let client = Client::attach("franka", &AttachOptions::default(), &mut keep_waiting())?;
+/// let about = client.description();
+/// let dofs = about.dof_names.len();
+/// let target = Command {
+///     field: "joint_target_q",
+///     columns: 0..dofs,
+///     values: Values::F32(&vec![0.0; about.worlds * dofs]),
+/// };
+/// let frame = client.step(&[target], &mut keep_waiting())?;
+/// // (worlds, coordinates) in shared memory; `None` where the daemon runs in f64
+/// let joint_q: Option<&[f32]> = frame.field("joint_q")?.as_slice();
+/// # Ok::<(), ProtocolError>(())
+/// ```
 #[derive(Debug)]
 pub struct Client {
     description: Arc<Description>,
@@ -30,7 +48,7 @@ pub struct Client {
     release: AtomicBool,
     frames: Arc<Alive>,
     connection: Arc<Connection>,
-    process: u32,
+    maker: Maker,
 }
 
 impl Client {
@@ -99,7 +117,7 @@ impl Client {
             release: AtomicBool::new(false),
             frames: Alive::new(),
             connection: Arc::new(connection),
-            process: std::process::id(),
+            maker: Maker::this(),
         })
     }
 
@@ -125,6 +143,17 @@ impl Client {
         self.controller.look(Option::is_some).unwrap_or(true)
     }
 
+    /// How frames kept their pace since the daemon started, or since somebody counted anew, as `clear` does.
+    ///
+    /// # Errors
+    /// [`ProtocolError::DaemonLost`] and its kin.
+    pub fn timing(&self, clear: bool, hook: Hook<'_>) -> Result<Timing, ProtocolError> {
+        match self.connection.ask(&Request::Timing { clear }, hook)? {
+            Response::Timing(timing) => Ok(timing),
+            _ => Err(malformed("the answer to timing")),
+        }
+    }
+
     /// Takes the lease; done by itself at the first [`Client::step`], [`Client::send`], [`Client::reset`], [`Client::write`],
     /// [`Client::forward`], [`Client::snapshot`] or [`Client::restore`]. From then on a thread of this client sends heartbeats.
     ///
@@ -137,10 +166,10 @@ impl Client {
 
     /// The ports belong to the process that opened them.
     fn check_process(&self) -> Result<(), ProtocolError> {
-        if std::process::id() == self.process {
+        if self.maker.is_this() {
             return Ok(());
         }
-        let (name, pid) = (self.description.name.clone(), self.process);
+        let (name, pid) = (self.description.name.clone(), self.maker.pid());
         Err(ProtocolError::Forked { name, pid })
     }
 
@@ -292,12 +321,26 @@ impl Client {
         self.run(&call, hook)
     }
 
-    fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+    /// Solves the inverse kinematics that the file at `path` asks for with the daemon's model; the answer takes its place. No
+    /// world moves. Returns a frame.
+    ///
+    /// # Errors
+    /// As [`Client::step`]; [`ProtocolError::CommandRefused`] where the daemon cannot read or write `path`, which must be
+    /// absolute, or cannot solve what it asks.
+    pub fn ik(&self, path: &str, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        let call = Call {
+            path: Some(path),
+            ..Call::new(Op::Ik, &[], None)
+        };
+        self.run(&call, hook)
+    }
+
+    pub(crate) fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.with_controller(hook, |controller, hook| controller.run(call, hook))
     }
 
     /// Takes the lease first, if this client has none.
-    fn with_controller<T>(
+    pub(crate) fn with_controller<T>(
         &self,
         hook: Hook<'_>,
         call: impl FnOnce(&mut Controller, Hook<'_>) -> Result<T, ProtocolError>,
@@ -455,7 +498,7 @@ impl Client {
 impl Drop for Client {
     fn drop(&mut self) {
         // in a forked child the ports belong to the parent: leave them alone
-        if std::process::id() != self.process {
+        if !self.maker.is_this() {
             // what another thread used when the process forked is out of reach, and as good as forgotten
             std::mem::forget(self.controller.value().and_then(Option::take));
             std::mem::forget(self.observer.value().and_then(Option::take));

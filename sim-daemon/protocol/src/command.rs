@@ -11,6 +11,8 @@ pub(crate) const MASK: &str = "mask";
 pub(crate) const PATH: &str = "path";
 /// Name of the world of a snapshot that goes into all, in a command: one `u64`.
 pub(crate) const FROM_WORLD: &str = "from_world";
+/// Name of what a step takes from device memory: the value of the timeline of commands, then a bit per command.
+pub(crate) const ON_DEVICE: &str = "on_device";
 /// Longest path [bytes], as Linux has it.
 pub(crate) const PATH_MAX: usize = 4096;
 /// Name of the seeds in a reset.
@@ -51,6 +53,15 @@ pub struct Command<'a> {
     pub values: Values<'a>,
 }
 
+/// Commands of a step that the client leaves in device memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OnDevice {
+    /// Value that the timeline of commands has when the client is done with all frames that it dropped, and with these commands.
+    pub ready: u64,
+    /// A bit per command, in the order of [`crate::DeviceMemory::commands`].
+    pub commands: u64,
+}
+
 /// One call of a client, as it came.
 pub(crate) struct Call<'a> {
     pub(crate) op: Op,
@@ -60,6 +71,7 @@ pub(crate) struct Call<'a> {
     pub(crate) from_world: Option<u64>,
     /// One for all worlds, or one a world.
     pub(crate) seed: Option<&'a [u64]>,
+    pub(crate) on_device: Option<OnDevice>,
 }
 
 impl<'a> Call<'a> {
@@ -72,6 +84,7 @@ impl<'a> Call<'a> {
             path: None,
             from_world: None,
             seed: None,
+            on_device: None,
         }
     }
 
@@ -177,6 +190,7 @@ impl<'a> Call<'a> {
             self.mask.is_some(),
             self.path.is_some(),
             self.from_world.is_some(),
+            self.on_device.is_some(),
         ];
         self.arrays.len() + others.into_iter().filter(|&is_there| is_there).count()
     }
@@ -193,7 +207,9 @@ impl<'a> Call<'a> {
             .path
             .map_or(0, |path| path.len().next_multiple_of(ALIGNMENT));
         let from_world = self.from_world.map_or(0, |_| ALIGNMENT);
-        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + seed + mask + path + from_world
+        let on_device = self.on_device.map_or(0, |_| ALIGNMENT);
+        let rest = seed + mask + path + from_world + on_device;
+        Table::head_bytes(self.rows()) + arrays.sum::<usize>() + rest
     }
 
     /// Writes field table and arrays; of `words`, every word that means something.
@@ -246,6 +262,9 @@ impl<'a> Call<'a> {
         if let Some(world) = self.from_world {
             data[bytes_of(FROM_WORLD, Dtype::U64, 1)][0] = world;
         }
+        if let Some(OnDevice { ready, commands }) = self.on_device {
+            data[bytes_of(ON_DEVICE, Dtype::U64, 2)].copy_from_slice(&[ready, commands]);
+        }
     }
 }
 
@@ -262,7 +281,7 @@ pub(crate) fn command_bytes(description: &Description) -> usize {
     let entries = description.worlds * (columns * description.real().size()).max(size_of::<u64>());
     // an input may come in several pieces, each rounded up
     let head = Table::head_bytes(ROWS_MAX) + ROWS_MAX * ALIGNMENT;
-    let restore = PATH_MAX + ALIGNMENT;
+    let restore = PATH_MAX + 2 * ALIGNMENT;
     head + entries.next_multiple_of(ALIGNMENT) + mask_bytes(description.worlds) + restore
 }
 

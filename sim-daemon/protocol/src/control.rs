@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::timing::Timing;
+
 /// Longest request as JSON [bytes].
 pub(crate) const REQUEST_MAX: usize = 512;
 
@@ -31,10 +33,20 @@ pub enum Request {
         /// The lease.
         epoch: u64,
     },
+    /// Let frames and commands of my lease stay on the card. I have connected to the socket, where the answer goes.
+    DeviceMemory {
+        /// The lease.
+        epoch: u64,
+    },
     /// Let me record what you do, in a journal of my own.
     Journal {
         /// Fields whose arrays come with each entry: a bit each, in the order of the frame.
         observed: u64,
+    },
+    /// How do frames keep their pace? And count anew, if `clear`.
+    Timing {
+        /// Forget what was measured, after it is told.
+        clear: bool,
     },
     /// End the daemon.
     Shutdown,
@@ -79,6 +91,10 @@ pub enum Response {
         /// False when the lease was lost before.
         valid: bool,
     },
+    /// Answer to [`Request::DeviceMemory`]: the rest comes by the socket.
+    BySocket,
+    /// Answer to [`Request::Timing`].
+    Timing(Timing),
     /// Answer to [`Request::Shutdown`].
     Ending,
     /// The request could not be read, or not be met.

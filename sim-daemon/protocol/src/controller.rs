@@ -12,6 +12,7 @@ use crate::command::{Call, command_bytes};
 use crate::connection::{Connection, S, damaged, intact, intact_there, malformed, pause};
 use crate::control::{Request, Response};
 use crate::described::{self, Damage};
+use crate::device_memory::{self, Delivery};
 use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::heartbeat::HeartbeatThread;
@@ -66,6 +67,8 @@ pub(crate) struct Controller {
     waiters: [Waiter; Op::ALL.len() + 1],
     affinity: CoreAffinity,
     table: Option<Arc<Table>>,
+    /// When the frame of the next step is due [ns]; 0 where it comes as soon as it can.
+    due: u64,
     frames: Arc<Alive>,
     publisher: CommandPublisher<S>,
     subscriber: FrameSubscriber<S>,
@@ -134,6 +137,7 @@ impl Controller {
             waiters: std::array::from_fn(|_| Waiter::new(free_core)),
             affinity: CoreAffinity::new(),
             table: None,
+            due: 0,
             frames: Arc::clone(frames),
             publisher,
             subscriber,
@@ -170,19 +174,43 @@ impl Controller {
         self.open(sample)
     }
 
+    /// Asks for device memory of this lease.
+    pub(crate) fn device_memory(&mut self, hook: Hook<'_>) -> Result<Delivery, ProtocolError> {
+        self.land(hook)?;
+        let (peer, epoch) = (&self.connection.peer, self.epoch);
+        let socket = device_memory::visit(&peer.paths, peer.beacon.session, epoch);
+        let socket = socket.or_else(|error| peer.check().and(Err(error)))?;
+        match self
+            .connection
+            .ask(&Request::DeviceMemory { epoch }, hook)?
+        {
+            Response::BySocket => {}
+            Response::Refused { reason } => return Err(ProtocolError::NotShared { reason }),
+            _ => return Err(malformed("the answer to a request for device memory")),
+        }
+        // the driver compiles and takes memory meanwhile
+        let delivery = device_memory::receive(&socket, ANSWER_MAX, hook)?;
+        delivery.ok_or_else(|| peer.timeout(ANSWER_MAX))
+    }
+
     /// Checks a command, and that nothing is in the way of its frame.
     fn make_ready(&mut self, call: &Call<'_>, hook: Hook<'_>) -> Result<(), ProtocolError> {
         call.check(&self.description)?;
+        self.land(hook)?;
+        self.frames.check(self.description.frames_held)
+    }
+
+    /// Takes the answer to a command that was abandoned.
+    pub(crate) fn land(&mut self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         match self.flight {
-            Flight::Landed => {}
+            Flight::Landed => Ok(()),
             Flight::Sent => {
                 // that the daemon is lost explains more
                 self.connection.peer.check()?;
-                return Err(ProtocolError::StepInFlight);
+                Err(ProtocolError::StepInFlight)
             }
-            Flight::Abandoned(op) => drop(self.answer(op as usize - 1, hook)?),
+            Flight::Abandoned(op) => self.answer(op as usize - 1, hook).map(drop),
         }
-        self.frames.check(self.description.frames_held)
     }
 
     /// Lets a test send what it likes, and reads the answer.
@@ -236,11 +264,14 @@ impl Controller {
             hook,
             since: Instant::now(),
         };
+        let is_step = waiter == Op::Step as usize - 1 || waiter == Op::ALL.len();
+        let due = if is_step { self.due } else { 0 };
         let (waiter, peer) = (&mut self.waiters[waiter], &self.connection.peer);
-        let sample = guarded(|| waiter.wait(&self.listener, &mut awaited))
+        let sample = guarded(|| waiter.wait_due(due, &self.listener, &mut awaited))
             .ok_or_else(|| damaged(peer, "wait for a frame"))??;
         self.flight = Flight::Landed;
         let head = loaned::head(&sample).ok_or_else(|| damaged(peer, "read a frame"))?;
+        self.due = head.due_next;
         let shared = head.core == self.affinity.core();
         self.waiters
             .iter_mut()

@@ -129,10 +129,50 @@ pub struct Description {
     /// Which state evaluated outputs belong to: that in the "frame", or that of the "last_substep". Older recordings have the first.
     #[serde(default = "in_frame")]
     pub outputs_at: String,
+    /// The pace of frames, where they keep one. Older recordings have none.
+    #[serde(default)]
+    pub pace: Option<Pace>,
     /// Size of the state of all worlds, as recorders get it [bytes].
     pub state_bytes: u64,
     /// Hash over the fields, inputs, worlds and dofs; see [`Description::schema_hash`].
     pub schema: u64,
+}
+
+/// Frames that keep to real time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// Simulated seconds a second.
+    pub realtime: f64,
+    /// From one frame to the next [ns].
+    pub period_ns: u64,
+    /// What becomes of worlds whose command is late.
+    pub late: Late,
+    /// Time without a command after which [`Late::Hold`] becomes [`Late::Stop`] [ns].
+    pub command_timeout_ns: Option<u64>,
+}
+
+/// What worlds do whose next command has not come when their frame is due.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Late {
+    /// Stand still until it comes.
+    Pause,
+    /// Go on with the last commands.
+    Hold,
+    /// Go on with efforts, controls and velocity targets of zero; position targets stay.
+    Stop,
+}
+
+impl Late {
+    /// The inverse of its name on the command line.
+    pub fn named(name: &str) -> Option<Late> {
+        match name {
+            "pause" => Some(Late::Pause),
+            "hold" => Some(Late::Hold),
+            "stop" => Some(Late::Stop),
+            _ => None,
+        }
+    }
 }
 
 /// A number of the model that may vary from world to world.

@@ -185,6 +185,13 @@ pub enum ProtocolError {
         reason: String,
     },
 
+    /// Frames and commands cannot stay on the card.
+    #[error("frames and commands cannot stay on the card: {reason}")]
+    NotShared {
+        /// What is missing.
+        reason: String,
+    },
+
     /// A step was sent, and its frame was not received yet; nothing was sent or touched.
     #[error("a step was sent and its frame was not received; call recv first")]
     StepInFlight,

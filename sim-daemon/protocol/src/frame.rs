@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use iceoryx2::sample::Sample;
 
 use crate::connection::S;
+use crate::forked::Maker;
 use crate::port::Port;
 use crate::{Dtype, FrameHeader, Line, ProtocolError, Row, Table};
 
@@ -29,14 +30,14 @@ pub struct Frame {
 #[derive(Debug)]
 pub(crate) struct Alive {
     count: AtomicUsize,
-    process: u32,
+    maker: Maker,
 }
 
 impl Alive {
     pub(crate) fn new() -> Arc<Alive> {
         Arc::new(Alive {
             count: AtomicUsize::new(0),
-            process: std::process::id(),
+            maker: Maker::this(),
         })
     }
 
@@ -145,7 +146,7 @@ impl Drop for Frame {
     fn drop(&mut self) {
         let sample = self.sample.get_mut().ok().and_then(Option::take);
         // in a forked child the slot is the parent's to give back
-        if std::process::id() != self.alive.process {
+        if !self.alive.maker.is_this() {
             return std::mem::forget(sample);
         }
         // the slot goes back before the count goes down, so that the count never promises a slot that is not there

@@ -7,7 +7,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 /// Version of everything in this crate that the other side must agree on.
-pub const PROTOCOL_VERSION: u32 = 3;
+pub const PROTOCOL_VERSION: u32 = 5;
 
 /// Alignment of a sample and of every array in it [bytes].
 pub const ALIGNMENT: usize = 64;
@@ -32,7 +32,7 @@ impl Line {
 /// Head of a sample from the daemon.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("tightloop.FrameHeader.v1")]
+#[type_name("tightloop.FrameHeader.v3")]
 pub struct FrameHeader {
     /// Run of the daemon.
     pub session: u64,
@@ -52,8 +52,14 @@ pub struct FrameHeader {
     pub rows: u32,
     /// Core that the daemon runs on.
     pub core: u64,
+    /// 1 more than the slot of device memory that has the same frame; 0 if none has.
+    pub slot: u64,
+    /// Value of the timeline of frames when that slot is written.
+    pub done: u64,
+    /// When the next frame is due on the monotonic clock [ns]; 0 where frames keep no pace.
+    pub due_next: u64,
 }
-const _: () = assert!(size_of::<FrameHeader>() == 64 && align_of::<FrameHeader>() == 8);
+const _: () = assert!(size_of::<FrameHeader>() == 88 && align_of::<FrameHeader>() == 8);
 
 /// Head of a sample to the daemon.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
@@ -91,17 +97,20 @@ pub enum Op {
     Snapshot = 5,
     /// Set the worlds under the mask to those of such a file, or to one of them; evaluate the fields there.
     Restore = 6,
+    /// Solve the inverse kinematics that a file asks for, write the answer into it, evaluate the fields.
+    Ik = 7,
 }
 
 impl Op {
     /// All, in the order of their numbers, which begin with 1.
-    pub const ALL: [Op; 6] = [
+    pub const ALL: [Op; 7] = [
         Op::Step,
         Op::Reset,
         Op::Write,
         Op::Forward,
         Op::Snapshot,
         Op::Restore,
+        Op::Ik,
     ];
 
     /// The inverse of `op as u32`.

@@ -2,10 +2,11 @@
 //!
 //! ```text
 //!            wake (event)  ◄───────────────── notify ──────────────────┐
-//!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · journal · shutdown
+//!            control (request-response, JSON) ◄── describe · acquire · heartbeat · release · journal · timing · shutdown
 //!  daemon    act/<epoch>   (pub-sub, 1 : 1)   ◄── command: header, field table, arrays ──   controller
 //!            obs/<epoch>   (pub-sub, 1 : 1)   ──► frame:   header, field table, arrays ──►
 //!            watch         (pub-sub, 1 : n)   ──► frames of the first worlds and their state, at a limited rate ──► observers
+//!            <session>.socket (Unix) ──► descriptors of device memory, where frames and commands of the lease stay on the card
 //!            journal/<n>   (pub-sub, 1 : 1)   ──► each command carried out, and digests of its frame ──► recorder
 //! ```
 //!
@@ -30,6 +31,7 @@
 mod affinity;
 mod cgroup;
 mod client;
+mod clock;
 mod command;
 mod connection;
 mod control;
@@ -38,9 +40,11 @@ pub mod daemon_lock;
 mod described;
 mod description;
 pub mod descriptors;
+mod device_memory;
 pub mod digest;
 mod discovery;
 mod error;
+mod forked;
 mod frame;
 mod guard;
 pub mod hash;
@@ -55,20 +59,27 @@ mod loaned;
 mod mapping;
 mod memory;
 mod observer;
+mod on_device;
+mod park;
 pub mod paths;
 mod port;
 mod problem;
+mod reentrant;
 mod service;
 mod storage;
 pub mod table;
+mod timing;
 mod transport;
 mod turn;
 mod waiter;
 
 pub use client::Client;
-pub use command::{Command, Values};
+pub use command::{Command, OnDevice, Values};
 pub use daemon_lock::{cleanup_after_death, sweep};
-pub use description::{Description, FieldInfo, InputInfo, KeyframeInfo, ParamInfo, RobotRange};
+pub use description::{
+    Description, FieldInfo, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
+};
+pub use device_memory::{Delivery, DeviceCommand, DeviceMemory};
 pub use discovery::{AttachOptions, find};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};
@@ -80,3 +91,4 @@ pub use journal::{Entry as JournalEntry, Journal};
 pub use journal_header::JournalHeader;
 pub use paths::{Beacon, running};
 pub use table::{ROWS_MAX, Table};
+pub use timing::{Percentiles, Timing};

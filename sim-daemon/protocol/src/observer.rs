@@ -10,6 +10,7 @@ use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::loaned;
+use crate::park::park;
 use crate::port::Port;
 use crate::transport::{self, FrameSubscriber, SLICE, Sleeper};
 use crate::{Description, Frame, ProtocolError, Table};
@@ -104,7 +105,7 @@ impl Observer {
             if let ControlFlow::Break(()) = hook() {
                 return Err(ProtocolError::Interrupted);
             }
-            guarded(|| transport::park(&self.listener, left))
+            guarded(|| park(&self.listener, left))
                 .ok_or_else(|| damaged(&self.connection.peer, "wait for a frame"))??;
         }
     }

@@ -7,7 +7,6 @@ use iceoryx2::service::internal::ServiceInternal;
 use iceoryx2_bb_elementary_traits::testing::abandonable::Abandonable;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use iceoryx2_bb_lock_free::mpmc::counting_bit_set::RelocatableCountingBitSet;
-use iceoryx2_cal::arc_sync_policy::mutex_protected::MutexProtected;
 use iceoryx2_cal::arc_sync_policy::single_threaded::SingleThreaded;
 use iceoryx2_cal::event::trigger::{State, unix_datagram_socket::GenericUnixDatagramSocketTrigger};
 use iceoryx2_cal::resizable_shared_memory::dynamic::DynamicMemory;
@@ -17,6 +16,7 @@ use iceoryx2_cal::shm_allocator::pool_allocator::PoolAllocator;
 use iceoryx2_cal::zero_copy_connection::common::details::{Connection, SharedManagementData};
 use iceoryx2_cal::{bag, hash, monitoring, reactor, serialize, static_storage};
 
+use crate::reentrant::Reentrant;
 use crate::storage::Storage;
 
 /// Memory of payloads.
@@ -60,5 +60,5 @@ service!(
 );
 service!(
     /// Services whose ports and samples go to any thread.
-    AnyThread, MutexProtected
+    AnyThread, Reentrant
 );

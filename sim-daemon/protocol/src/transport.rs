@@ -10,7 +10,7 @@ use std::time::Duration;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::config::Config;
 use iceoryx2::port::client::Client as ControlClient;
-use iceoryx2::port::listener::{Listener, ListenerWaitError};
+use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::server::Server;
@@ -424,17 +424,6 @@ pub(crate) fn notifier<S: Service>(service: &EventService<S>) -> Result<Waker<S>
         .create()
         .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a notifier", error))
-}
-
-/// Sleeps until notified or for `timeout`, and drains what was notified. A signal ends it early.
-pub(crate) fn park<S: Service>(
-    listener: &Listener<S>,
-    timeout: Duration,
-) -> Result<(), ProtocolError> {
-    match listener.timed_wait(|_| {}, timeout) {
-        Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
-        Err(error) => Err(ProtocolError::transport("wait for an event", error)),
-    }
 }
 
 /// The daemon's end of the control service.

@@ -4,9 +4,12 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::prelude::Service;
+use iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
 
 use crate::ProtocolError;
-use crate::transport::{SLICE, park};
+use crate::clock::{self, Alarm};
+use crate::park::park;
+use crate::transport::SLICE;
 
 const SPIN_MIN: Duration = Duration::from_micros(5);
 const SPIN_SURE: Duration = Duration::from_micros(40);
@@ -16,6 +19,12 @@ const WAKE_MARGIN: Duration = Duration::from_micros(100);
 /// Beyond this, a wake-up is lost in the wait itself.
 const FORESEEN_MAX: Duration = Duration::from_millis(20);
 
+/// What is due so soon is not worth a look at anything else.
+const NEAR: Duration = Duration::from_millis(5);
+
+/// Looks between two looks at the clock, which cost a fifth of one.
+const LOOKS: u32 = 8;
+
 /// Most waits that sleep at once after spinning was in vain.
 const REST_MAX: u32 = 64;
 
@@ -24,12 +33,17 @@ pub(crate) trait Awaited<T> {
     /// Looks for it; called over and over.
     fn poll(&mut self) -> Result<Option<T>, ProtocolError>;
 
+    /// The longest sleep before [`Awaited::poll`] will find something; none where that is not known.
+    fn patience(&self) -> Option<Duration> {
+        None
+    }
+
     /// Looks at everything else; called after each sleep, hence at least every 50 ms, never while spinning.
     fn poll_rest(&mut self) -> Result<Option<T>, ProtocolError>;
 }
 
 /// What was learnt about one kind of wait.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct Waiter {
     /// Moving average of recent waits.
     typical: Duration,
@@ -39,6 +53,7 @@ pub(crate) struct Waiter {
     rest: u32,
     /// Whether both sides run on one core.
     shared: bool,
+    alarm: Alarm,
 }
 
 impl Waiter {
@@ -50,6 +65,7 @@ impl Waiter {
             resting: 0,
             rest: 0,
             shared: false,
+            alarm: Alarm::new(),
         }
     }
 
@@ -58,7 +74,10 @@ impl Waiter {
         &mut self,
         listener: &Listener<S>,
         awaited: &mut impl Awaited<T>,
-    ) -> Result<T, ProtocolError> {
+    ) -> Result<T, ProtocolError>
+    where
+        Listener<S>: FileDescriptorBased,
+    {
         if let Some(found) = awaited.poll()? {
             self.learn(Duration::ZERO);
             return Ok(found);
@@ -66,7 +85,14 @@ impl Waiter {
         let mut start = Instant::now();
         if self.may_spin() {
             if self.typical > SPIN_MAX {
-                park(listener, self.typical - WAKE_MARGIN)?;
+                let sleep = self.typical - WAKE_MARGIN;
+                match awaited.patience() {
+                    None => park(listener, sleep)?,
+                    Some(patience) if patience > WAKE_MARGIN => {
+                        park(listener, sleep.min(patience - WAKE_MARGIN))?;
+                    }
+                    Some(_) => {}
+                }
             }
             if let Some(found) = self.spin(awaited)? {
                 self.learn(start.elapsed());
@@ -77,7 +103,20 @@ impl Waiter {
             start = Instant::now();
         }
         loop {
-            park(listener, SLICE)?;
+            match awaited.patience() {
+                None => park(listener, SLICE)?,
+                Some(patience) if patience > WAKE_MARGIN => {
+                    park(listener, (patience - WAKE_MARGIN).min(SLICE))?;
+                }
+                // too short to sleep
+                Some(_) => {
+                    if let Some(found) = awaited.poll()? {
+                        return Ok(found);
+                    }
+                    std::hint::spin_loop();
+                    continue;
+                }
+            }
             // a notification may be an old one: only looking tells
             if let Some(found) = awaited.poll()? {
                 self.learn(start.elapsed());
@@ -89,9 +128,45 @@ impl Waiter {
         }
     }
 
+    /// Waits until something is found that is due at a time of the monotonic clock [ns], or as soon as it can where that is 0.
+    pub(crate) fn wait_due<S: Service, T>(
+        &mut self,
+        due: u64,
+        listener: &Listener<S>,
+        awaited: &mut impl Awaited<T>,
+    ) -> Result<T, ProtocolError>
+    where
+        Listener<S>: FileDescriptorBased,
+    {
+        if due == 0 {
+            return self.wait(listener, awaited);
+        }
+        loop {
+            let rest = Duration::from_nanos(due.saturating_sub(clock::now()));
+            if rest < NEAR {
+                break;
+            }
+            park(listener, (rest - NEAR / 2).min(SLICE))?;
+            if let Some(found) = awaited.poll()? {
+                return Ok(found);
+            }
+            if let Some(found) = awaited.poll_rest()? {
+                return Ok(found);
+            }
+        }
+        self.alarm.sleep_until_shortly_before(due);
+        // it comes at a known time: to spin for it is not in vain, whatever was learnt about other waits
+        if self.free_core && !self.shared {
+            let end = Instant::now() + Duration::from_nanos(due.saturating_sub(clock::now()));
+            if let Some(found) = spin_until(end + SPIN_SURE, awaited)? {
+                return Ok(found);
+            }
+        }
+        self.wait(listener, awaited)
+    }
+
     /// Spins for as long as is worth it.
     fn spin<T>(&mut self, awaited: &mut impl Awaited<T>) -> Result<Option<T>, ProtocolError> {
-        let start = Instant::now();
         // while spinning pays, an interrupt of the other side is waited out as well
         let (times, least) = if self.rest == 0 {
             (4, SPIN_SURE)
@@ -99,15 +174,9 @@ impl Waiter {
             (2, SPIN_MIN)
         };
         let worthwhile = (times * self.typical).clamp(least, SPIN_MAX);
-        loop {
-            if let Some(found) = awaited.poll()? {
-                self.rest /= 2;
-                return Ok(Some(found));
-            }
-            if start.elapsed() > worthwhile {
-                break;
-            }
-            std::hint::spin_loop();
+        if let Some(found) = spin_until(Instant::now() + worthwhile, awaited)? {
+            self.rest /= 2;
+            return Ok(Some(found));
         }
         self.rest = (2 * self.rest).clamp(1, REST_MAX);
         self.resting = self.rest;
@@ -134,6 +203,24 @@ impl Waiter {
     fn learn(&mut self, wait: Duration) {
         let ceiling = (4 * self.typical).clamp(SPIN_MIN, 2 * FORESEEN_MAX);
         self.typical = (9 * self.typical + wait.min(ceiling)) / 10;
+    }
+}
+
+/// Looks for something over and over until a time.
+fn spin_until<T>(
+    end: Instant,
+    awaited: &mut impl Awaited<T>,
+) -> Result<Option<T>, ProtocolError> {
+    loop {
+        for _ in 0..LOOKS {
+            if let Some(found) = awaited.poll()? {
+                return Ok(Some(found));
+            }
+            std::hint::spin_loop();
+        }
+        if Instant::now() > end {
+            return Ok(None);
+        }
     }
 }
 

@@ -211,8 +211,8 @@ impl Run {
         };
         self.inbox.take(header, command.words).map_err(refused)?;
         let advance = match self.op() {
-            // the state that came before is what the restore has left; a snapshot changes nothing
-            Op::Restore | Op::Snapshot => Advance::Forward,
+            // the state that came before is what the restore has left; a snapshot or a question changes nothing
+            Op::Restore | Op::Snapshot | Op::Ik => Advance::Forward,
             _ => export::apply(&mut self.simulation, &self.inbox, &mut self.mask)
                 .map_err(|refusal| refused(refusal.reason))?,
         };

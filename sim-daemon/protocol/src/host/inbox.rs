@@ -1,7 +1,7 @@
 //! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
 
-use crate::command::{FROM_WORLD, MASK, PATH, command_bytes};
-use crate::{CommandHeader, Description, Dtype, Op, Row, Table};
+use crate::command::{Call, FROM_WORLD, MASK, ON_DEVICE, OnDevice, PATH, Values, command_bytes};
+use crate::{Command, CommandHeader, Description, Dtype, Op, Row, Table};
 
 /// The last command received.
 #[derive(Debug)]
@@ -64,6 +64,7 @@ impl Inbox {
             (MASK, Dtype::U8),
             (PATH, Dtype::U8),
             (FROM_WORLD, Dtype::U64),
+            (ON_DEVICE, Dtype::U64),
         ] {
             let row = self.table.row(name);
             if let Some(row) = row.filter(|row| row.dtype != dtype || row.shape.len() != 1) {
@@ -73,6 +74,11 @@ impl Inbox {
                     "{name}: {got} of {axes} axes; {expected} of one is needed"
                 ));
             }
+        }
+        let left = self.table.row(ON_DEVICE);
+        if let Some(row) = left.filter(|row| row.shape[..] != [2]) {
+            let got = row.shape[0];
+            return Err(format!("{ON_DEVICE}: {got} entries; 2 are needed"));
         }
         self.used = payload.len();
         Ok(())
@@ -93,9 +99,69 @@ impl Inbox {
         &self.header
     }
 
-    /// The arrays, without the mask.
+    /// The arrays, without the mask and what is in device memory.
     pub fn arrays(&self) -> impl Iterator<Item = &Row> {
-        self.table.rows().iter().filter(|row| row.name != MASK)
+        let rows = self.table.rows().iter();
+        rows.filter(|row| row.name != MASK && row.name != ON_DEVICE)
+    }
+
+    /// What a step takes from device memory, if anything.
+    pub fn on_device(&self) -> Option<OnDevice> {
+        let row = self.table.row(ON_DEVICE)?;
+        let &[ready, commands] = bytemuck::cast_slice::<_, u64>(self.bytes(row)) else {
+            return None;
+        };
+        Some(OnDevice { ready, commands })
+    }
+
+    /// Makes one of a step of commands here and commands that were in device memory.
+    ///
+    /// # Errors
+    /// One sentence, where commands here have other than single precision, or do not fit beside the others.
+    pub fn bring_here(
+        &mut self,
+        description: &Description,
+        brought: &[(String, Vec<f32>)],
+    ) -> Result<(), String> {
+        let here: Vec<(Row, Vec<f32>)> = self
+            .arrays()
+            .map(|row| match self.numbers(row) {
+                Some(Numbers::F32(values)) => Ok((row.clone(), values.to_vec())),
+                _ => Err(format!("`{}`: entries must be float32", row.name)),
+            })
+            .collect::<Result<_, _>>()?;
+        let worlds = description.worlds.max(1);
+        let there = brought.iter().map(|(name, values)| Command {
+            field: name,
+            columns: 0..values.len() / worlds,
+            values: Values::F32(values),
+        });
+        let here = here.iter().map(|(row, values)| Command {
+            field: &row.name,
+            columns: row.start..row.start + values.len() / worlds,
+            values: Values::F32(values),
+        });
+        let commands: Vec<Command<'_>> = here.chain(there).collect();
+        self.put(description, self.header, self.op, &commands)
+    }
+
+    /// Takes a command that the daemon makes itself.
+    ///
+    /// # Errors
+    /// As [`Inbox::take`], and what does not fit.
+    pub(super) fn put(
+        &mut self,
+        description: &Description,
+        header: CommandHeader,
+        op: Op,
+        commands: &[Command<'_>],
+    ) -> Result<(), String> {
+        let call = Call::new(op, commands, None);
+        call.check(description).map_err(|error| error.to_string())?;
+        let mut words = vec![0; call.bytes(description) / 8];
+        call.write(description, &mut words);
+        let (op, rows) = (op as u32, call.rows() as u32);
+        self.take(CommandHeader { op, rows, ..header }, &words)
     }
 
     /// The numbers of an array; `None` when it is not of one of those types.

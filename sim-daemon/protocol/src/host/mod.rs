@@ -4,16 +4,18 @@
 mod cleanup;
 mod inbox;
 mod journal;
+mod late;
 mod lease;
 mod observers;
 mod orphans;
+mod pace;
 mod state;
 #[cfg(test)]
 mod tests;
 mod worlds;
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub use cleanup::ClientCleanup;
@@ -23,17 +25,20 @@ pub use worlds::{Next, Worlds};
 use self::journal::Journals;
 use self::lease::Lease;
 use self::observers::Observers;
+use self::pace::Pacer;
 use self::state::{State, header};
 use self::worlds::S;
 use crate::affinity::CoreAffinity;
+use crate::clock;
 use crate::daemon_lock::DaemonLock;
 use crate::described;
+use crate::device_memory::{self, Delivery, Door};
 use crate::guard::guarded;
 use crate::mapping;
 use crate::memory;
 use crate::transport::{self, Sleeper, handshake};
 use crate::waiter::{Waiter, cores};
-use crate::{Description, ProtocolError, RefusalKind, Table};
+use crate::{Description, Op, ProtocolError, RefusalKind, Table};
 
 /// While commands come without a pause, control requests are looked at this often.
 const AROUND_PERIOD: Duration = Duration::from_millis(20);
@@ -85,6 +90,7 @@ impl Host {
         let listener = transport::listener(&transport::create_event(&node, "wake", &attributes)?)?;
         let responder = transport::responder(&node)?;
         described::write(daemon_lock.paths(), &description)?;
+        let door = Door::open(daemon_lock.paths(), session)?;
         let observers = Observers::open(&node, &description, &frame)?;
         let lease = Lease::open(&node, 1, &frame, description.frames_held)?;
         // last: from here on clients may come
@@ -96,6 +102,7 @@ impl Host {
             _ => description.busy_threads(),
         };
         let inbox = Inbox::for_commands_of(&description);
+        let pacer = Pacer::new(&description);
         let state = State {
             node,
             paths: daemon_lock.paths().clone(),
@@ -107,11 +114,14 @@ impl Host {
             epochs: 1,
             responder,
             observers,
+            door,
+            visitor: None,
             polled: Instant::now(),
             frames: 0,
             inbox,
             stop,
             affinity: CoreAffinity::new(),
+            pacer,
         };
         Ok(Host {
             state,
@@ -192,12 +202,79 @@ impl Host {
     ///
     /// `started` is when work on the command began.
     pub fn answer(&mut self, started: Instant, worlds: &mut impl Worlds) {
+        if self.state.inbox.op() == Op::Step && !self.approach() {
+            return self.state.record_inputs();
+        }
         self.state.answer(started, worlds);
+    }
+
+    /// Serves everything but commands until shortly before the frame is due. False if nobody waits for it any more.
+    fn approach(&mut self) -> bool {
+        while let Some(due) = self.state.pacer.due() {
+            let wait = Duration::from_nanos(due.saturating_sub(clock::now()));
+            if wait < AROUND_PERIOD {
+                break;
+            }
+            if !self.is_waited_for() {
+                return false;
+            }
+            std::thread::sleep((wait - AROUND_PERIOD / 2).min(AROUND_PERIOD));
+        }
+        true
+    }
+
+    /// Puts a step into [`Host::inbox`] that no client sent, after [`Next::Late`].
+    pub fn give_up(&mut self) {
+        self.state.give_up();
+    }
+
+    /// The worlds stand still until the next step comes.
+    pub fn stand_still(&mut self) {
+        self.state.pacer.stand_still();
+    }
+
+    /// Advances the worlds by that step, and shows observers; `arena` has room for a frame.
+    pub fn advance(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
+        self.state.advance(arena, worlds);
     }
 
     /// The number of the present lease: its frames lie in memory of its own. 0 if there is none.
     pub fn lease(&self) -> u64 {
         self.state.lease.as_ref().map_or(0, |lease| lease.epoch)
+    }
+
+    /// Slots of frames that a lease has.
+    pub fn frame_slots(&self) -> usize {
+        transport::frame_slots(self.state.description.frames_held)
+    }
+
+    /// Answers [`Next::DeviceMemory`]; `make` makes it, or says why it cannot.
+    pub fn deliver(&mut self, make: impl FnOnce(&Host) -> Result<Delivery, String>) {
+        let Some((epoch, stream)) = self.state.visitor.take() else {
+            return;
+        };
+        let answer = match self.lease() == epoch {
+            true => make(self),
+            false => Err("its lease has ended".to_owned()),
+        };
+        device_memory::deliver(&stream, answer);
+    }
+
+    /// Serves everything but commands, while the one in [`Host::inbox`] waits for its client's card. False if nobody waits for it any more.
+    pub fn is_waited_for(&mut self) -> bool {
+        if self.state.poll_services() == Some(Next::End) {
+            self.state.stop.store(true, Ordering::Relaxed);
+        }
+        !self.state.stop.load(Ordering::Relaxed) && self.lease() == self.state.inbox.header().epoch
+    }
+
+    /// Makes one of the present step of commands here and commands that were in device memory; see [`Inbox::bring_here`].
+    ///
+    /// # Errors
+    /// One sentence about what does not fit.
+    pub fn bring_here(&mut self, brought: &[(String, Vec<f32>)]) -> Result<(), String> {
+        let state = &mut self.state;
+        state.inbox.bring_here(&state.description, brought)
     }
 
     /// Whether a recorder is attached.
@@ -218,9 +295,11 @@ impl Host {
         self.state.journals.end(session, reason);
     }
 
-    /// Answers the command with a refusal.
+    /// Answers the command with a refusal, unless its lease has ended: another client may have the present one.
     pub fn refuse(&mut self, kind: RefusalKind, reason: &str) {
-        self.state.refuse(kind, reason);
+        if self.lease() == self.state.inbox.header().epoch {
+            self.state.refuse(kind, reason);
+        }
     }
 
     /// Shows observers the present state; `arena` has room for a frame.

@@ -1,5 +1,6 @@
 //! What a host looks after: leases, control requests, observers, and the answers to commands.
 
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -9,11 +10,14 @@ use iceoryx2::prelude::Node;
 use super::journal::{Journals, Occasion, RECORDERS_MAX};
 use super::lease::Lease;
 use super::observers::Observers;
+use super::pace::Pacer;
 use super::worlds::{Next, S, Worlds};
 use super::{ClientCleanup, Inbox};
 use crate::affinity::CoreAffinity;
+use crate::clock;
 use crate::control::{Request, Response};
 use crate::described::{self, Damage};
+use crate::device_memory::Door;
 use crate::guard::guarded;
 use crate::loaned;
 use crate::mapping;
@@ -22,7 +26,7 @@ use crate::paths::DaemonPaths;
 use crate::port::Port;
 use crate::transport::{self, Responder};
 use crate::waiter::Awaited;
-use crate::{ALIGNMENT, Description, Dtype, FrameHeader, ProtocolError, RefusalKind, Table};
+use crate::{ALIGNMENT, Description, Dtype, FrameHeader, Op, ProtocolError, RefusalKind, Table};
 
 /// A look around that comes later than this was held up by ourselves, and heartbeats with it.
 const HELD_UP: Duration = Duration::from_millis(200);
@@ -39,11 +43,15 @@ pub(super) struct State {
     pub(super) epochs: u64,
     pub(super) responder: Responder<S>,
     pub(super) observers: Observers,
+    pub(super) door: Door,
+    /// Who waits for device memory, and of which lease.
+    pub(super) visitor: Option<(u64, UnixStream)>,
     pub(super) polled: Instant,
     pub(super) frames: u64,
     pub(super) inbox: Inbox,
     pub(super) stop: Arc<AtomicBool>,
     pub(super) affinity: CoreAffinity,
+    pub(super) pacer: Pacer,
 }
 
 impl State {
@@ -51,6 +59,7 @@ impl State {
     fn renew(&mut self) {
         // the old slots go first: there may not be room for both
         let old = self.lease.take();
+        self.pacer.rest();
         guarded(|| drop(old));
         self.epochs += 1;
         // without room now, the next request for a lease tries again and reports why
@@ -140,6 +149,17 @@ impl State {
         }
     }
 
+    /// Lets in the holder of a lease who wants device memory.
+    fn visit(&mut self, epoch: u64) -> Response {
+        match self.door.visitor(epoch) {
+            Ok(stream) => {
+                self.visitor = Some((epoch, stream));
+                Response::BySocket
+            }
+            Err(reason) => Response::Refused { reason },
+        }
+    }
+
     /// Answers the control requests that are there.
     fn control(&mut self) -> Option<Next> {
         let (mut end, mut later) = (false, Vec::new());
@@ -172,7 +192,15 @@ impl State {
                     lease.into_iter().for_each(Lease::joined);
                     Response::Lease { valid }
                 }
+                Ok(Request::DeviceMemory { epoch }) => self.visit(epoch),
                 Ok(Request::Journal { observed }) => self.journal(observed),
+                Ok(Request::Timing { clear }) => {
+                    let timing = self.pacer.timing();
+                    if clear {
+                        self.pacer.clear();
+                    }
+                    Response::Timing(timing)
+                }
                 Ok(Request::Shutdown) => {
                     end = true;
                     Response::Ending
@@ -204,16 +232,28 @@ impl State {
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
         let is_good = worlds.frame(arena);
+        let on_device = worlds.on_device();
         self.frames += 1;
         self.observers.changed();
-        let now = Instant::now();
+        let made = Instant::now();
         let common = header(&self.description, &self.frame, self.frames);
-        let busy_ns = now.duration_since(started).as_nanos() as u64;
+        let busy_ns = made.duration_since(started).as_nanos() as u64;
+        let is_step = self.inbox.op() == Op::Step;
+        let now = match self.pacer.is_paced() && is_step {
+            true => {
+                self.pacer.hold();
+                Instant::now()
+            }
+            false => made,
+        };
         *loan.user_header_mut() = FrameHeader {
             epoch: lease.epoch,
             ack_seq: self.inbox.header().seq,
             busy_ns,
             core: self.affinity.core(),
+            slot: on_device.map_or(0, |(slot, _)| 1 + slot as u64),
+            done: on_device.map_or(0, |(_, done)| done),
+            due_next: self.pacer.due_next(),
             ..common
         };
         if let Some(holder) = &mut lease.holder {
@@ -225,6 +265,9 @@ impl State {
         };
         // a holder that cannot be notified looks by itself after 50 ms
         guarded(|| lease.notifier.notify());
+        if is_step {
+            self.pacer.leave(now, busy_ns, true);
+        }
         // last: nobody waits for it
         let head = Table::head_bytes(self.frame.rows().len()) / 8;
         if is_good && self.observers.is_due() {
@@ -242,7 +285,7 @@ impl State {
     }
 
     /// Sends recorders a command whose inputs were set, but that has no client left to get a frame.
-    fn record_inputs(&mut self) {
+    pub(super) fn record_inputs(&mut self) {
         let occasion = Occasion {
             description: &self.description,
             inbox: &self.inbox,
@@ -328,11 +371,12 @@ impl State {
             self.journals.lose();
             false
         });
-        next.or(waits.then_some(Next::Record))
+        let visits = self.visitor.is_some().then_some(Next::DeviceMemory);
+        next.or(visits).or(waits.then_some(Next::Record))
     }
 }
 
-/// Answers a request. A client that died or gave up while it waited is no trouble of ours.
+/// Answers a request. An error is ignored: a client that died or gave up needs no answer.
 fn respond(active: &transport::Asked<S>, response: &Response) {
     let bytes = serde_json::to_vec(response).expect("responses are plain data");
     if let Ok(loan) = active.loan_slice_uninit(bytes.len()) {
@@ -340,8 +384,9 @@ fn respond(active: &transport::Asked<S>, response: &Response) {
     }
 }
 
-impl Awaited<Next> for State {
-    fn poll(&mut self) -> Result<Option<Next>, ProtocolError> {
+impl State {
+    /// Looks for a command.
+    fn poll_commands(&mut self) -> Result<Option<Next>, ProtocolError> {
         let Some(lease) = &mut self.lease else {
             return Ok(None);
         };
@@ -383,7 +428,24 @@ impl Awaited<Next> for State {
             );
             return Ok(None);
         }
+        match self.inbox.op() {
+            Op::Step => self.pacer.receive(),
+            _ => self.pacer.rest(),
+        }
         Ok(Some(Next::Command))
+    }
+}
+
+impl Awaited<Next> for State {
+    fn poll(&mut self) -> Result<Option<Next>, ProtocolError> {
+        let found = self.poll_commands()?;
+        let is_late = || self.pacer.deadline().is_some_and(|due| clock::now() >= due);
+        Ok(found.or_else(|| is_late().then_some(Next::Late)))
+    }
+
+    fn patience(&self) -> Option<Duration> {
+        let due = self.pacer.deadline()?;
+        Some(Duration::from_nanos(due.saturating_sub(clock::now())))
     }
 
     fn poll_rest(&mut self) -> Result<Option<Next>, ProtocolError> {

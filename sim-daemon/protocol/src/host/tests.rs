@@ -1,173 +1,15 @@
 //! A host without physics against clients that send nonsense.
 
-use std::path::PathBuf;
-use std::sync::mpsc::{Sender, channel};
-use std::thread::JoinHandle;
-
-use std::sync::atomic::Ordering;
+mod fake;
 
 use super::*;
 use crate::PROTOCOL_VERSION;
 use crate::paths::DaemonPaths;
 use crate::transport::CommandPublisher;
-use crate::{
-    AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, InputInfo, Op, keep_waiting,
-};
+use crate::{AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, OnDevice, Op, keep_waiting};
+use fake::{Fake, STATE};
 
 type Clients = crate::service::AnyThread;
-
-/// Bytes of the state of the daemon below: several entries long.
-const STATE: usize = 40_000;
-
-/// A daemon on a thread: it answers every command with the number of commands so far.
-struct Fake {
-    name: String,
-    root: PathBuf,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-fn description() -> Description {
-    let input = |name: &str| InputInfo {
-        name: name.to_owned(),
-        columns: 3,
-        unit: "-".to_owned(),
-        doc: String::new(),
-    };
-    Description {
-        protocol: 0,
-        release: String::new(),
-        name: String::new(),
-        session: 0,
-        pid: 0,
-        group: 0,
-        groups: 1,
-        first_world: 0,
-        worlds: 2,
-        device: "none".to_owned(),
-        adapter: String::new(),
-        delivery: "direct".to_owned(),
-        precision: "f32".to_owned(),
-        threads: 1,
-        dt: 0.01,
-        substeps: 1,
-        gravity: [0.0; 3],
-        dof_names: ["a/x", "a/y", "a/z"].map(str::to_owned).to_vec(),
-        coord_names: Vec::new(),
-        body_names: Vec::new(),
-        shape_names: Vec::new(),
-        site_names: Vec::new(),
-        contact_sensor_names: Vec::new(),
-        actuator_names: Vec::new(),
-        activation_names: Vec::new(),
-        mocap_names: Vec::new(),
-        mocap_quat: Vec::new(),
-        equality_names: Vec::new(),
-        keyframes: Vec::new(),
-        sensor_names: Vec::new(),
-        sensors: Vec::new(),
-        robots: Vec::new(),
-        fields: Vec::new(),
-        known_fields: Vec::new(),
-        commands: vec![input("joint_f")],
-        writes: vec![input("joint_q")],
-        params: Vec::new(),
-        scene: String::new(),
-        scene_folder: String::new(),
-        model_hash: 0,
-        notes: Vec::new(),
-        warnings: Vec::new(),
-        driven: Vec::new(),
-        angle_range: Vec::new(),
-        frames_held: 2,
-        watch_worlds: 1,
-        watch_state_bytes: STATE as u64,
-        joint_q_max: None,
-        joint_qd_max: None,
-        on_fault: "freeze".to_owned(),
-        on_nan: "refuse".to_owned(),
-        draws: "world".to_owned(),
-        outputs_at: "frame".to_owned(),
-        state_bytes: 0,
-        schema: 0,
-    }
-}
-
-/// Worlds whose frames and state are a number; the state takes a time to give.
-struct Counted(u64, Duration);
-
-impl Worlds for Counted {
-    fn frame(&mut self, arena: &mut [u64]) -> bool {
-        arena[..2].fill(self.0);
-        true
-    }
-
-    fn state(&mut self, to: &mut [u8]) -> bool {
-        std::thread::sleep(self.1);
-        to.fill(self.0 as u8);
-        true
-    }
-}
-
-/// Serves until told to stop; sends word when clients may come.
-fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
-    let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
-    let daemon_lock = DaemonLock::take(paths).unwrap();
-    let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
-    let mut cleanup = host.client_cleanup();
-    ready.send(()).unwrap();
-    let mut count = 0;
-    loop {
-        match host.wait().unwrap() {
-            Next::Command => {
-                count += 1;
-                host.answer(Instant::now(), &mut Counted(count, takes));
-            }
-            Next::Observe => host.show(&mut [0; 8], &mut Counted(count, takes)),
-            Next::Record => host.record_state(&[count as u8; STATE], false),
-            Next::End => break,
-        }
-    }
-    cleanup.clean();
-}
-
-impl Fake {
-    fn start(test: &str) -> Fake {
-        Fake::slow(test, Duration::ZERO)
-    }
-
-    /// One whose state takes a time to give.
-    fn slow(test: &str, takes: Duration) -> Fake {
-        let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
-        let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
-        let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
-        let theirs = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || serve(&paths, theirs, ready, takes));
-        wait.recv().unwrap();
-        Fake {
-            name: "fake".to_owned(),
-            root,
-            stop,
-            thread: Some(thread),
-        }
-    }
-
-    fn attach(&self) -> Client {
-        let options = AttachOptions {
-            root: Some(self.root.clone()),
-            ..AttachOptions::default()
-        };
-        Client::attach(&self.name, &options, &mut keep_waiting()).unwrap()
-    }
-}
-
-impl Drop for Fake {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap();
-        std::fs::remove_dir(&self.root).expect("nothing is left in the root folder");
-    }
-}
 
 fn count(frame: &Frame) -> u64 {
     frame.field("count").unwrap().as_slice::<u64>().unwrap()[0]
@@ -206,7 +48,16 @@ fn hostile_commands_are_refused_with_a_reason_and_the_host_goes_on() {
         rows: 1,
         core: 0,
     };
-    let cases: [(&str, CommandHeader, Vec<u64>, &str); 12] = [
+    let left = Table::lay_out([("on_device".to_owned(), Dtype::U64, vec![1], 0)]);
+    let mut short = vec![0; left.total_bytes() / 8];
+    short[..left.words().len()].copy_from_slice(left.words());
+    let cases: [(&str, CommandHeader, Vec<u64>, &str); 13] = [
+        (
+            "device memory without its commands",
+            header,
+            short,
+            "on_device: 1 entries; 2 are needed",
+        ),
         (
             "a truncated table",
             header,
@@ -465,4 +316,23 @@ fn facts_that_differ_are_refused_with_both_named() {
     );
     drop((wake, node, daemon_lock));
     std::fs::remove_dir(root).expect("nothing is left in the root folder");
+}
+
+#[test]
+fn a_client_that_goes_while_its_card_is_waited_for_holds_nobody_up() {
+    let fake = Fake::start("card");
+    let hook: Hook<'_> = &mut keep_waiting();
+    let (first, second) = (fake.attach(), fake.attach());
+    let refused = first.device_memory(hook).unwrap_err().to_string();
+    // 2 frames that are held, one that is received, one that waits and one that is written
+    assert!(refused.contains("no card for 5 slots"), "{refused}");
+    let on_device = OnDevice {
+        ready: u64::MAX,
+        commands: 0,
+    };
+    first.send_on_device(&[], on_device, hook).unwrap();
+    // requests are served meanwhile
+    assert_eq!(second.controller(hook).unwrap(), Some(std::process::id()));
+    drop(first);
+    assert_eq!(count(&second.step(&[], hook).unwrap()), 1);
 }

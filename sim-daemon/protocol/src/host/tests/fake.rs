@@ -1,0 +1,183 @@
+//! A daemon without physics, on a thread.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
+
+use super::super::*;
+use crate::paths::DaemonPaths;
+use crate::{AttachOptions, Client, Dtype, InputInfo, keep_waiting};
+
+/// Bytes of the state of the daemon: several entries long.
+pub(super) const STATE: usize = 40_000;
+/// How late the daemon refuses a step whose client has gone [ms].
+const LATE_MS: u64 = 200;
+
+/// A daemon on a thread: it answers every command with the number of commands so far.
+pub(super) struct Fake {
+    pub name: String,
+    pub root: PathBuf,
+    pub stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+fn description() -> Description {
+    let input = |name: &str| InputInfo {
+        name: name.to_owned(),
+        columns: 3,
+        unit: "-".to_owned(),
+        doc: String::new(),
+    };
+    Description {
+        protocol: 0,
+        release: String::new(),
+        name: String::new(),
+        session: 0,
+        pid: 0,
+        group: 0,
+        groups: 1,
+        first_world: 0,
+        worlds: 2,
+        device: "none".to_owned(),
+        adapter: String::new(),
+        delivery: "direct".to_owned(),
+        precision: "f32".to_owned(),
+        threads: 1,
+        dt: 0.01,
+        substeps: 1,
+        gravity: [0.0; 3],
+        dof_names: ["a/x", "a/y", "a/z"].map(str::to_owned).to_vec(),
+        coord_names: Vec::new(),
+        body_names: Vec::new(),
+        shape_names: Vec::new(),
+        site_names: Vec::new(),
+        contact_sensor_names: Vec::new(),
+        actuator_names: Vec::new(),
+        activation_names: Vec::new(),
+        mocap_names: Vec::new(),
+        mocap_quat: Vec::new(),
+        equality_names: Vec::new(),
+        keyframes: Vec::new(),
+        sensor_names: Vec::new(),
+        sensors: Vec::new(),
+        robots: Vec::new(),
+        fields: Vec::new(),
+        known_fields: Vec::new(),
+        commands: vec![input("joint_f")],
+        writes: vec![input("joint_q")],
+        params: Vec::new(),
+        scene: String::new(),
+        scene_folder: String::new(),
+        model_hash: 0,
+        notes: Vec::new(),
+        warnings: Vec::new(),
+        pace: None,
+        driven: Vec::new(),
+        angle_range: Vec::new(),
+        frames_held: 2,
+        watch_worlds: 1,
+        watch_state_bytes: STATE as u64,
+        joint_q_max: None,
+        joint_qd_max: None,
+        on_fault: "freeze".to_owned(),
+        on_nan: "refuse".to_owned(),
+        draws: "world".to_owned(),
+        outputs_at: "frame".to_owned(),
+        state_bytes: 0,
+        schema: 0,
+    }
+}
+
+/// Worlds whose frames and state are a number; the state takes a time to give.
+struct Counted(u64, Duration);
+
+impl Worlds for Counted {
+    fn frame(&mut self, arena: &mut [u64]) -> bool {
+        arena[..2].fill(self.0);
+        true
+    }
+
+    fn state(&mut self, to: &mut [u8]) -> bool {
+        std::thread::sleep(self.1);
+        to.fill(self.0 as u8);
+        true
+    }
+}
+
+/// Serves until told to stop; sends word when clients may come.
+fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
+    let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
+    let daemon_lock = DaemonLock::take(paths).unwrap();
+    let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
+    let mut cleanup = host.client_cleanup();
+    ready.send(()).unwrap();
+    let mut count = 0;
+    loop {
+        match host.wait().unwrap() {
+            Next::Command if host.inbox().on_device().is_some() => {
+                // a card that never gets there
+                while host.is_waited_for() {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                // meanwhile another client gets the lease and sends a command
+                for _ in 0..LATE_MS {
+                    std::thread::sleep(Duration::from_millis(1));
+                    host.is_waited_for();
+                }
+                host.refuse(RefusalKind::Stale, "nobody waits");
+            }
+            Next::Command => {
+                count += 1;
+                host.answer(Instant::now(), &mut Counted(count, takes));
+            }
+            Next::Observe => host.show(&mut [0; 8], &mut Counted(count, takes)),
+            Next::DeviceMemory => host.deliver(|host| {
+                let slots = host.frame_slots();
+                Err(format!("no card for {slots} slots"))
+            }),
+            Next::Late => unreachable!("it keeps no pace"),
+            Next::Record => host.record_state(&[count as u8; STATE], false),
+            Next::End => break,
+        }
+    }
+    cleanup.clean();
+}
+
+impl Fake {
+    pub fn start(test: &str) -> Fake {
+        Fake::slow(test, Duration::ZERO)
+    }
+
+    /// One whose state takes a time to give.
+    pub fn slow(test: &str, takes: Duration) -> Fake {
+        let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
+        let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
+        let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
+        let theirs = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || serve(&paths, theirs, ready, takes));
+        wait.recv().unwrap();
+        Fake {
+            name: "fake".to_owned(),
+            root,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    pub fn attach(&self) -> Client {
+        let options = AttachOptions {
+            root: Some(self.root.clone()),
+            ..AttachOptions::default()
+        };
+        Client::attach(&self.name, &options, &mut keep_waiting()).unwrap()
+    }
+}
+
+impl Drop for Fake {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+        std::fs::remove_dir(&self.root).expect("nothing is left in the root folder");
+    }
+}
