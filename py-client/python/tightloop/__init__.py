@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         DaemonLost,
         DaemonRestarted,
         FramesHeld,
+        GpuMemoryError,
         LaunchError,
         LeaseHeld,
         LeaseLost,
@@ -53,10 +54,15 @@ if TYPE_CHECKING:
     )
     from tightloop.frames import FrameCopy
     from tightloop.groups import Groups
+    from tightloop.ik_objectives import Posture, Reach
+    from tightloop.inverse_kinematics import IkResult, IkSolver, ik
     from tightloop.joint_order import JointOrder
     from tightloop.launching import attach, launch
+    from tightloop.linearization import Linearization, linearize
     from tightloop.rays import RayHits
+    from tightloop.realtime import RealTime, Timing
     from tightloop.robot import Link, Robot
+    from tightloop.rollouts import Rollout
     from tightloop.scene import Scene
     from tightloop.sensors import ContactSensor, Site
     from tightloop.shapes import Shape, Surface
@@ -76,6 +82,7 @@ _HOMES = {
         "DaemonLost",
         "DaemonRestarted",
         "FramesHeld",
+        "GpuMemoryError",
         "LaunchError",
         "LeaseHeld",
         "LeaseLost",
@@ -100,10 +107,15 @@ _HOMES = {
     ),
     "tightloop.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
+    "tightloop.ik_objectives": ("Posture", "Reach"),
+    "tightloop.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
     "tightloop.joint_order": ("JointOrder",),
     "tightloop.launching": ("attach", "launch"),
+    "tightloop.linearization": ("Linearization", "linearize"),
     "tightloop.rays": ("RayHits",),
+    "tightloop.realtime": ("RealTime", "Timing"),
     "tightloop.robot": ("Link", "Robot"),
+    "tightloop.rollouts": ("Rollout",),
     "tightloop.scene": ("Scene",),
     "tightloop.sensors": ("ContactSensor", "Site"),
     "tightloop.shapes": ("Shape", "Surface"),
@@ -125,20 +137,28 @@ __all__ = [
     "Frame",
     "FrameCopy",
     "FramesHeld",
+    "GpuMemoryError",
     "Groups",
+    "IkResult",
+    "IkSolver",
     "JointOrder",
     "LaunchError",
     "LeaseHeld",
     "LeaseLost",
+    "Linearization",
     "Link",
     "MissingLibrary",
     "Normal",
     "OutputError",
+    "Posture",
     "ProtocolMismatch",
     "RayHits",
+    "Reach",
+    "RealTime",
     "RecordingError",
     "ResourceError",
     "Robot",
+    "Rollout",
     "Scene",
     "SceneError",
     "Shape",
@@ -151,6 +171,7 @@ __all__ = [
     "Surface",
     "TightloopError",
     "TightloopWarning",
+    "Timing",
     "TransportError",
     "Uniform",
     "UnknownAttribute",
@@ -161,7 +182,9 @@ __all__ = [
     "WaitTimeout",
     "__version__",
     "attach",
+    "ik",
     "launch",
+    "linearize",
 ]
 
 

@@ -217,6 +217,24 @@ class Frame:
     def fields(self) -> list[str]:
         """Names of the fields in this frame."""
 
+    def torch(self, name: str) -> Any:
+        """Return a field as a tensor of torch on the simulation's GPU, ``(worlds, …)``; it shares the daemon's memory.
+
+        The tensor holds the frame: it stays valid and unchanged until you drop it. Do not write to it. The rules are
+        those of `Sim.keep_on_gpu`.
+
+        Raises:
+            GpuMemoryError: The frame is not on a GPU that this process sees; the message has the cure.
+            MissingLibrary: torch is not installed.
+            UnknownField: The frame does not carry that field.
+        """
+
+    def cuda(self, name: str) -> Any:
+        """Return a field on the simulation's GPU for CuPy and JAX, ``(worlds, …)``. Raises as `torch` does.
+
+        It has ``__cuda_array_interface__`` and ``__dlpack__``.
+        """
+
     def copy(self) -> FrameCopy:
         """Copy the arrays into memory of their own, as attributes of the same names."""
 
@@ -225,6 +243,9 @@ class Client:
 
     def __init__(self, name: str, *, lease: bool) -> None: ...
     def describe(self) -> str: ...
+    def device_memory(self) -> tuple[str, list[int]]: ...
+    def keep_on(self, card: Any, /) -> None: ...
+    def land(self) -> None: ...
     def step(
         self,
         joint_f: Any,
@@ -232,6 +253,7 @@ class Client:
         joint_target_qd: Any,
         ctrl: Any,
         more: dict[str, NDArray[np.float64]],
+        on_device: tuple[int, int] | None,
         /,
     ) -> Frame: ...
     def send(
@@ -241,6 +263,7 @@ class Client:
         joint_target_qd: Any,
         ctrl: Any,
         more: dict[str, NDArray[np.float64]],
+        on_device: tuple[int, int] | None,
         /,
     ) -> None: ...
     def recv(self) -> Frame: ...
@@ -251,9 +274,11 @@ class Client:
     def reset(self, mask: Any, seed: Any, joint_q: Any, joint_qd: Any, /) -> Frame: ...
     def forward(self) -> Frame: ...
     def snapshot(self, path: str, /) -> Frame: ...
+    def ik(self, path: str, /) -> Frame: ...
     def restore(self, path: str, mask: Any, from_world: int | None, /) -> Frame: ...
     def latest(self) -> Frame | None: ...
     def wait_newer(self, timeout: float, /) -> Frame | None: ...
+    def timing(self, clear: bool, /) -> str: ...
     def controller(self) -> int | None: ...
     def release(self) -> None: ...
     def close(self) -> None: ...
@@ -322,6 +347,36 @@ class Dynamics:
         damping: bool,
         /,
     ) -> NDArray[np.float64]: ...
+
+class Ik:
+    """A scene's frames; `tightloop.ik` makes it."""
+
+    def __init__(self, scene: str, folder: str) -> None: ...
+    @property
+    def names(self) -> tuple[list[str], list[str], list[str]]: ...
+    @property
+    def start(self) -> list[float]: ...
+    def solver(self, task: str, /) -> IkTaskSolver: ...
+
+class IkTaskSolver:
+    """A solver of a task; `tightloop.IkSolver` wraps it, and documents its method."""
+
+    def solve(
+        self,
+        count: int,
+        arrays: Sequence[NDArray[np.float64]],
+        attempts: tuple[int, int, int],
+        tolerance: tuple[float, float],
+        run: tuple[bool, int],
+        /,
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.bool_],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.uint32],
+        NDArray[np.uint32],
+    ]: ...
 
 class RayScene:
     """What rays meet in a scene; `tightloop.rays.Rays` wraps it."""

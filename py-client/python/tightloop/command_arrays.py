@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,10 @@ from tightloop.params import Params
 #: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot,
 #: joint or pattern.
 Command = ArrayLike | Mapping[str, ArrayLike | Mapping[str, ArrayLike]]
+
+#: Commands of a step: those that the client converts, then those that `ready_arrays` prepares
+_OWN: tuple[str, ...] = ("joint_f", "joint_target_q", "joint_target_qd", "ctrl")
+_PREPARED: tuple[str, ...] = ("mocap_pos", "mocap_quat", "eq_active", "body_f")
 
 
 def ready_arrays(
@@ -46,14 +50,25 @@ def ready_arrays(
     return found
 
 
-def step_arrays(
-    sim: Any, mocap_pos: Any, mocap_quat: Any, eq_active: Any, body_f: Any
-) -> dict[str, NDArray[np.float64]]:
-    """Return those commands of a step of a `Sim` that `ready_arrays` prepares."""
+def step_arguments(sim: Any, own: Sequence[Any], prepared: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the arguments of a step of a `Sim` as its client takes them.
+
+    Args:
+        sim: The simulation.
+        own: ``joint_f``, ``joint_target_q``, ``joint_target_qd`` and ``ctrl``, each an array or None.
+        prepared: ``mocap_pos``, ``mocap_quat``, ``eq_active`` and ``body_f``, likewise.
+    """
+    on_device = None
+    if sim._card is not None:
+        given = dict(zip(_OWN + _PREPARED, (*own, *prepared), strict=True))
+        sim._client.land()  # the daemon may still read what the last step left there
+        on_device = sim._card.take(given)
+        own, prepared = [given[name] for name in _OWN], [given[name] for name in _PREPARED]
+    mocap_pos, mocap_quat, eq_active, body_f = prepared
     if mocap_pos is mocap_quat is eq_active is body_f is None:  # most steps, which must not take longer
-        return {}
-    given = {"mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active, "body_f": body_f}
-    return ready_arrays(sim.info, lambda: sim.params, "commands", given)
+        return (*own, {}, on_device)
+    given = dict(zip(_PREPARED, prepared, strict=True))
+    return (*own, ready_arrays(sim.info, lambda: sim.params, "commands", given), on_device)
 
 
 def _flat(name: str, value: Command, mocaps: int) -> Command:

@@ -11,7 +11,7 @@ import stat
 import struct
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -111,21 +111,36 @@ class Snapshot:
         records[worlds] = other._records()[worlds]
         return self._with(records)
 
+    def of_worlds(self, worlds: NDArray[np.integer[Any]] | Sequence[int]) -> Snapshot:
+        """Return a snapshot of the worlds with these indices, in this order; one may occur several times."""
+        return self._with(self._records()[np.asarray(worlds, np.intp)])
+
+    def in_double(self) -> Snapshot:
+        """Return the snapshot for the same simulation in double precision: the same values, converted exactly."""
+        if self.precision == "f64":
+            return self
+        counters, numbers = self._records()[:, :_COUNTERS], self.numbers.astype("<f8").view(np.uint8)
+        return self._with(np.concatenate((counters, numbers), axis=1), precision="f64")
+
     def with_model(self, model_hash: int) -> Snapshot:
         """Return the snapshot for a simulation of the same scene that has another hash, because of other substeps."""
-        return self._with(self._records(), model_hash)
+        return self._with(self._records(), model_hash=model_hash)
 
     def _records(self) -> NDArray[np.uint8]:
         return np.frombuffer(self._data, np.uint8, offset=_HEAD.size).reshape(self.worlds, -1)
 
-    def _with(self, records: NDArray[np.uint8], model_hash: int | None = None) -> Snapshot:
-        data = bytearray(self._data[: _HEAD.size]) + records.tobytes()
-        if model_hash is not None:
-            struct.pack_into("<Q", data, _COVERED, model_hash)
-        struct.pack_into("<I", data, _CHECKSUM, zlib.crc32(memoryview(data)[_COVERED:]))
+    def _with(
+        self, records: NDArray[np.uint8], *, model_hash: int | None = None, precision: str | None = None
+    ) -> Snapshot:
         made = Snapshot.__new__(Snapshot)
-        made._data, made.worlds, made.precision = bytes(data), self.worlds, self.precision
         made.model_hash = self.model_hash if model_hash is None else model_hash
+        made.worlds, made.precision = len(records), precision or self.precision
+        real = int(made.precision[1:]) // 8
+        numbers = (records.shape[1] - _COUNTERS) // real
+        head = bytearray(_HEAD.pack(_MAGIC, _VERSION, 0, made.model_hash, made.worlds, numbers, real))
+        data = head + records.tobytes()
+        struct.pack_into("<I", data, _CHECKSUM, zlib.crc32(memoryview(data)[_COVERED:]))
+        made._data = bytes(data)
         return made
 
     def to_bytes(self) -> bytes:

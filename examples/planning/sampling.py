@@ -1,0 +1,48 @@
+"""Predictive sampling (Howell et al. 2022): roll out the last plan with noise, and take the cheapest plan."""
+
+from __future__ import annotations
+
+import numpy as np
+from planning.problem import Array, Problem
+
+import tightloop as tl
+
+
+class Sampling:
+    """Plans by samples, each a world of one rollout.
+
+    A plan begins with the command that acts while the planner works. Its second command is the next one of the plant.
+
+    Args:
+        problem: The problem.
+        plan: A simulation of its scene.
+        seed: Seed of the noise.
+
+    Attributes:
+        controls: Controls of the present frame, ``(controls,)``.
+    """
+
+    def __init__(self, problem: Problem, plan: tl.Sim, seed: int) -> None:
+        self._problem, self._plan, self._random = problem, plan, np.random.default_rng(seed)
+        self.controls = problem.rest[list(problem.columns)]
+        self._best = np.tile(self.controls, (problem.horizon, 1))
+        # weights of the knots in each frame: straight lines between them
+        knots = np.arange(0, problem.horizon + problem.knot, problem.knot)
+        frames = np.arange(problem.horizon)
+        self._lines = np.stack([np.interp(frames, knots, one) for one in np.eye(len(knots))], axis=1)
+        self._out: tl.Rollout | None = None
+
+    def update(self, state: tl.Snapshot) -> None:
+        """Plan from the state at the start of the present frame; then `controls` are those of the next frame."""
+        problem, plan = self._problem, self._plan
+        noise = self._random.normal(0, problem.noise, (self._lines.shape[1], plan.worlds, len(self.controls)))
+        noise[:, 0] = 0.0  # the last plan competes, too
+        sampled = self._best[:, None] + np.tensordot(self._lines, noise, 1)
+        sampled = np.clip(sampled, problem.low, problem.high)
+        sampled[0] = self.controls
+        commands = {problem.command: problem.full(sampled)}
+        self._out = plan.rollout(commands, start=state, cost=problem.cost, out=self._out)
+        assert self._out.cost is not None
+        best: Array = sampled[:, (self._out.cost + problem.effort_cost(sampled).sum(axis=0)).argmin()]
+        self._best = np.append(best[1:], best[-1:], axis=0)
+        self.controls = self._best[0]
