@@ -26,6 +26,8 @@ PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml \
   -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
 PYTHON_FOLDERS := py-client/python py-client/tests tests examples benches docs
 RUFF           := $(VENV)/bin/ruff
+# What Python tests run: one build with the crates of the Rust tests.
+PROGRAMS       := cargo build --release --quiet --workspace --lib --example gpu_bench --example rust_client
 CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
 # Debian packages: a software Vulkan driver with its validation layer, and the browser of the viewer's tests.
@@ -33,7 +35,7 @@ VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 
 .PHONY: demo help test check check-format format docs test-rl train kills soak fuzz published menagerie mujoco-versions packages coverage \
-  newcomer bench bench-env bench-gpu bench-mujoco wheel dist vulkan browser llvm-cov \
+  newcomer bench bench-env bench-gpu bench-mujoco card wheel dist vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -56,6 +58,7 @@ test: announce-test vulkan browser wheel $(VENV)/.dev $(VENV)/.docs ## every Rus
 	@if cargo nextest --version >/dev/null 2>&1; \
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
+	$(PROGRAMS)
 	$(PYTEST) -n 2 --dist loadfile py-client/tests tests/python
 
 check: check-format wheel $(VENV)/.docs ## formats, lints and types, without tests
@@ -88,7 +91,7 @@ train: announce-train wheel $(VENV)/.rl ## train a policy, into out/ppo (TASK=Fr
 
 # Not part of `test`, which runs a few rounds: 200 take half an hour. Set the patience for a machine under load.
 kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUNDS=200 PATIENCE=2)
-	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/test_kill_matrix.py
+	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/test_kill_matrix.py tests/python/test_realtime.py
 
 soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
 	$(PYTHON) benches/soak.py --hours $(HOURS)
@@ -124,6 +127,7 @@ packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon 
 # Builds the workspace a second time, with counters, into target/llvm-cov-target.
 coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## what the tests run, into out/coverage
 	$(LLVM_COV) --release --workspace --lib --bins --tests --html --output-dir out/coverage/rust
+	$(PROGRAMS)
 	COVERAGE_FILE=out/coverage/python.data $(PYTEST) -n 2 --dist loadfile \
 	  --cov=tightloop --cov-report=html:out/coverage/python py-client/tests tests/python
 
@@ -137,6 +141,8 @@ bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is c
 	$(PYTHON) benches/contacts.py
 	$(PYTHON) benches/legged.py
 	$(PYTHON) benches/round_trip.py
+	$(PROGRAMS)
+	$(PYTHON) benches/clients.py
 	$(PYTHON) benches/snapshot.py
 	$(PYTHON) benches/recording.py
 	$(PYTHON) benches/viewer.py
@@ -158,7 +164,13 @@ bench-mujoco: wheel $(VENV)/.dev ## MuJoCo models from PyPI beside mjbatch (REFE
 # The adapter decides what the numbers mean: without a GPU they are those of a software Vulkan driver.
 bench-gpu: wheel $(VENV)/.dev vulkan ## worlds on the first GPU, checked and measured (GPU=name)
 	benches/gpu/run.sh $(GPU)
+	-$(PYTHON) benches/gpu/tensors.py # ends with 1 without an NVIDIA GPU
 	-$(PYTHON) benches/gpu/peers.py # ends with 1 where neither MuJoCo-Warp nor MJX is installed
+
+# Other wheels go along, such as those of mujoco and mujoco-mjx for the Python of that machine.
+card: wheel ## a folder for a machine with a GPU and no network, out/card; its card.sh checks and measures (WHEELS=files)
+	cargo build --release --quiet --workspace --example gpu_bench
+	benches/gpu/card_folder.sh out/card $(WHEELS)
 
 # One wheel holds client and daemon. As `pip install ./py-client`, but a terminal shows its progress.
 wheel: $(VENV)/.wheel ## build the wheel of client and daemon, and install it into .venv

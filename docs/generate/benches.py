@@ -22,8 +22,7 @@ table name its machine, commit and command.
 ## Summary
 
 These rows use independent commands. The rows of MuJoCo compare one thread with one thread. In the rows of EnvPool and
-gymnasium, each side uses all four cores. The first two rows and those of robots on the ground come from a 2-core
-machine, the others from a 4-core machine.
+gymnasium, each side uses all four cores of a 4-core machine. The other rows come from a 2-core machine.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
@@ -73,7 +72,7 @@ def _peers(workload: str, demo: str) -> Line:
     row = {"demo": demo, "commands": "own"}
     theirs, ours = row | {"side": "MuJoCo C rollout"}, row | {"side": "tightloop, daemon and Python"}
     rate = "median_steps_per_s"
-    place = "amd-epyc-2-cores/peers.csv"
+    place = "intel-r-xeon-r-processor-2-cores/peers.csv"
     return Line(workload, _ROLLOUT, place, theirs, ours, rate, rate, ours | {"column": "median_ratio"})
 
 
@@ -91,20 +90,20 @@ def _environments(peer: str, side: str) -> Line:
 
 def _on_the_ground(workload: str, model: str, steps_per_call: int) -> Line:
     row = {"model": model, "steps_per_call": str(steps_per_call)}
-    place = "amd-epyc-2-cores/mujoco_models.csv"
+    place = "intel-r-xeon-r-processor-2-cores/mujoco_models.csv"
     ratio = row | {"column": "median_ratio"}
     return Line(workload, "mjbatch 0.1.4", place, row, row, "mjbatch_steps_per_s", "tightloop_steps_per_s", ratio)
 
 
 _ROLLOUT = "MuJoCo C 3.17, `rollout`"
-_CONTACTS = "amd-epyc-4-cores/contacts.csv"
+_CONTACTS = "intel-r-xeon-r-processor-2-cores/contacts.csv"
 SUMMARY = (
     _peers("FR3 arm, position targets, no contacts", "target"),
     _peers("FR3 arm, torques, no contacts", "torque"),
     _beside("FR3 arm, torques, above its table", _CONTACTS, {"demo": "torque", "worlds_alike": "no"}),
     _beside("FR3 arm grasps a cube", _CONTACTS, {"demo": "grasp", "worlds_alike": "no"}),
     _beside("FR3 arm and cube, random targets", _CONTACTS, {"demo": "random", "worlds_alike": "no"}),
-    _beside("Quadruped, 18 dofs, no contacts", "amd-epyc-4-cores/legged.csv", {"robot": "quadruped"}),
+    _beside("Quadruped, 18 dofs, no contacts", "intel-r-xeon-r-processor-2-cores/legged.csv", {"robot": "quadruped"}),
     _on_the_ground("Go1 on the ground, feet only", "mjlab Go1, feet only", 4),
     _on_the_ground("G1 humanoid on the ground", "MuJoCo-Warp G1, flat", 4),
     _on_the_ground("Go1 falls and lies, all of it touches", "mjlab Go1 heap, pyramidal", 8),
@@ -141,6 +140,15 @@ BENCHES = {
             "median_ratio": "ratio",
         },
         _COMMANDS,
+    ),
+    "realtime": Bench(
+        "A loop of 1 kHz in real time",
+        """A Franka arm above its table, with frames of 2 substeps. Controllers answer at once. The bare loop has two
+threads that sleep until shortly before a frame is due, and spin; it computes nothing. All sides take turns.
+
+- `missed_percent` counts frames that left more than 0.1 ms after they were due, or whose command was late.
+- The other columns are from when a frame was due until the controller had it.
+""",
     ),
     "contacts": Bench(
         "Arm with contacts, beside MuJoCo C on one thread",
@@ -203,6 +211,25 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
             "batch_steps_per_s": "Batch steps/s",
             "batch_ratio": "ratio of Batch",
             "faulted": "faulted worlds",
+        },
+    ),
+    "ik": Bench(
+        "Inverse kinematics, beside mink on one core",
+        """Random reachable poses of the FR3's hand, to 1 mm and 0.1°. Both start at one position and restart at random.
+
+- MuJoCo's kinematics check the solutions of both sides.
+- mink solves one pose after another, with daqp and the best of several parameters. tightloop takes all poses in one
+  call.
+- tightloop's `f32` has 8 or 16 poses in a register, `f64` has one.
+""",
+        {
+            "side": "side",
+            "median_solves_per_s": "solves/s",
+            "reached_percent": "reached [%]",
+            "iterations": "iterations",
+            "restarts": "restarts",
+            "median_ratio": "× mink",
+            "asked_ratio": "asked ×",
         },
     ),
     "round_trip": Bench(
@@ -403,6 +430,19 @@ machines were busy.
             "first_picture_s": "first picture [s]",
             "whole_demo_s": "whole demo [s]",
             "asked_s": "asked [s]",
+        },
+    ),
+    "rollout": Bench(
+        "Rollouts",
+        """The time of 4096 rollouts of 20 frames with 4 substeps each, and of its parts. `physics` evaluates no field,
+`steps` also evaluates the fields, `rollout` also copies them.
+""",
+        {
+            "case": "case",
+            "part": "part",
+            "median_ms": "median [ms]",
+            "p99_ms": "99 % [ms]",
+            "asked_ms": "asked [ms]",
         },
     ),
     "snapshot": Bench(

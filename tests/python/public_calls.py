@@ -36,6 +36,13 @@ def of_scene(name: str, kinds: Mapping[str, str], /, **right: Any) -> Call:
     return Call(lambda world: getattr(world.scene(), name), kinds, right)
 
 
+def with_arm() -> tl.Scene:
+    """A scene of an arm alone."""
+    scene = tl.Scene()
+    scene.add_urdf(URDF, name="arm")
+    return scene
+
+
 MANY = "any values: a set of names that only a few models have; tests/python/mujoco tries them"
 CALLS: dict[str, Call] = {
     "Scene": Call(
@@ -179,8 +186,20 @@ CALLS: dict[str, Call] = {
             "log": "new file",
             "frames_held": "count",
             "watch_worlds": "count",
+            "realtime": "positive",
         },
         {"scene": tl.Scene(), "worlds": 1},
+    ),
+    "RealTime": Call(
+        lambda _: tl.RealTime,
+        {
+            "factor": "positive",
+            "late": "choice",
+            "command_timeout": "positive",
+            "cores": "cores",
+            "priority": "priority",
+            "lock_memory": "flag",
+        },
     ),
     "attach": Call(lambda _: tl.attach, {"name": "label"}),
     "Sim.step": Call(lambda world: world.sim.step, COMMANDS | OF_MODELS | {"body_f": "values"}),
@@ -198,6 +217,10 @@ CALLS: dict[str, Call] = {
     ),
     "Sim.latest": Call(lambda world: world.sim.latest, {"timeout": "least 0"}),
     "Sim.restore": Call(lambda world: world.restore, {"snapshot": "snapshot", "worlds": "mask", "from_world": "index"}),
+    "Sim.copy_from": Call(
+        lambda world: world.sim.copy_from,
+        {"source": "snapshot", "world": "index", "mask": "mask"},
+    ),
     "Sim.forward_kinematics": Call(lambda world: world.sim.forward_kinematics, {"joint_q": "coordinates"}),
     "Sim.inverse_dynamics": Call(
         lambda world: world.sim.inverse_dynamics,
@@ -210,12 +233,65 @@ CALLS: dict[str, Call] = {
         {},
         {name: MANY for name in ("pnt", "vec", "geomgroup", "flg_static", "bodyexclude", "frame")},
     ),
+    "Sim.ik": Call(
+        lambda world: world.sim.ik,
+        {"objectives": "daemon objectives", "joints": "names", "limits": "flag"},
+        {"objectives": tl.Reach("arm/fr3_hand")},
+    ),
     "Sim.view": Call(
         lambda world: world.sim.view, {"port": "port", "worlds": "count", "open": "flag", "hosts": "hosts"}
     ),
     "Sim.picture": Call(
         lambda world: world.sim.picture,
         {"worlds": "some worlds", "camera": "camera", "size": "size", "frame": "frame"},
+    ),
+    "Sim.rollout": Call(
+        lambda world: world.sim.rollout,
+        {},
+        {},
+        dict.fromkeys(("commands", "fields", "start", "cost", "out"), "forms of its own: test_rollout.py tries them"),
+    ),
+    "ik": Call(
+        lambda _: tl.ik,
+        {"scene": "scene", "objectives": "objectives", "joints": "names", "limits": "flag"},
+        {"scene": with_arm(), "objectives": tl.Reach("arm/fr3_hand")},
+    ),
+    "Reach": Call(
+        lambda _: tl.Reach,
+        {
+            "frame": "text",
+            "position": "points",
+            "orientation": "quaternions",
+            "position_weight": "weights",
+            "orientation_weight": "weights",
+            "relative_to": "text",
+        },
+        {"frame": "arm/fr3_hand"},
+    ),
+    "Posture": Call(lambda _: tl.Posture, {"joint_q": "rows", "weight": "posture weight"}),
+    "IkSolver.solve": Call(
+        lambda world: world.ik.solve,
+        {
+            "position": "points",
+            "orientation": "quaternions",
+            "joint_q": "coordinates",
+            "iterations": "count",
+            "restarts": "index",
+            "tolerance": "positive pair",
+            "seed": "seed",
+            "precision": "choice",
+            "threads": "count",
+        },
+        {"position": (0.4, 0.0, 0.4), "orientation": (1.0, 0.0, 0.0, 0.0)},
+    ),
+    "linearize": Call(
+        lambda _: tl.linearize,
+        {"eps": "positive", "centered": "flag", "sensors": "flag"},
+        {},
+        dict.fromkeys(
+            ("sim", "worlds", "controls", "commands", "planner"),
+            "forms of its own: tests/python/mujoco/test_linearize.py tries them",
+        ),
     ),
     "Params.write": Call(
         lambda world: world.sim.params.write, {"gravity": "vectors", "shape_mu": "values", "mask": "mask"}
@@ -269,14 +345,19 @@ LEFT = {
     "Frame": "Sim.step makes it",
     "FrameCopy": "Frame.copy makes it",
     "Groups": "launch makes it",
+    "IkResult": "IkSolver.solve makes it",
+    "IkSolver": "ik makes it",
     "JointOrder": "Robot.order makes it",
+    "Linearization": "linearize makes it",
     "Link": "Robot.link makes it",
     "RayHits": "Sim.rays makes it",
     "Robot": "Scene.add_urdf makes it",
+    "Rollout": "Sim.rollout makes it",
     "Shape": "Scene.add_box makes it",
     "Sim": "launch makes it",
     "Site": "Scene.add_site makes it",
     "Snapshot": "Sim.snapshot makes it",
+    "Timing": "Sim.timing makes it",
     "Surface": "types of keyword arguments",
 }
 

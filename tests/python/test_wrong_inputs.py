@@ -103,6 +103,7 @@ def world(tmp_path_factory) -> Iterator[Any]:
             snapshot=snapshot,
             order=(arm := scene().robots["arm"]).order(arm.dof_names[::-1]),
             dynamics=tl.Dynamics(scene()),
+            ik=tl.ik(scene(), tl.Reach("arm/fr3_hand")),
             picture=SimpleNamespace(render=render),
             own={"Sim.send": sim.send, "Sim.restore": sim.restore, "Picture.render": picture.render},
             folder=tmp_path_factory.mktemp("films"),
@@ -115,6 +116,10 @@ def right(name: str, world: Any) -> dict[str, Any]:
     given = dict(CALLS[name].right)
     if name == "Film":
         given |= {"out": world.folder / "film.png", "sim": world.sim}
+    if name == "Sim.copy_from":
+        given["source"] = world.snapshot
+    if name == "linearize":
+        given["sim"] = world.sim
     if name == "Scene.add_mesh":
         given["path"] = world.mesh
     if name == "film":
@@ -204,6 +209,8 @@ OWN = (
     "with_numbers",
     "with_worlds",
     "with_model",
+    "of_worlds",
+    "in_double",
     "rows",
     "add",
     "jac",
@@ -214,7 +221,11 @@ def untried(name: str, thing: Callable[..., Any]) -> list[str]:
     if name not in CALLS:
         return [name]
     call = CALLS[name]
-    known = {*call.kinds, *call.left, *right(name, SimpleNamespace(folder=Path(), sim=None, mesh=Path()))}
+    known = {
+        *call.kinds,
+        *call.left,
+        *right(name, SimpleNamespace(folder=Path(), sim=None, snapshot=None, mesh=Path())),
+    }
     taken = inspect.signature(thing).parameters.values()
     plain = [argument for argument in taken if argument.kind not in (argument.VAR_KEYWORD, argument.VAR_POSITIONAL)]
     return [f"{name}({argument.name})" for argument in plain if argument.name not in ("self", *known)]

@@ -46,6 +46,17 @@ MASK = (
     THING,
     [[True], [True, False]],
 )
+#: Three columns of one problem or many.
+POINTS = (
+    "abc",
+    THING,
+    np.full(3, 1j),
+    np.zeros(2),
+    np.zeros((2, 5)),
+    np.zeros((1, 2, 3)),
+    np.full(3, NAN),
+    np.zeros((0, 3)),
+)
 #: Arrays of two worlds and 15 columns.
 ARRAY = (
     "abc",
@@ -81,6 +92,8 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "at least 0 or inf": (*NUMBER, -1.0, -INF),
     "count": COUNT,
     "optional count": COUNT,
+    "cores": ("1", 3, [1.5], [-1], ["a"], [None], THING),
+    "priority": (*COUNT, 100),
     "index": tuple(value for value in COUNT if value != 0),
     "triple": TRIPLE,
     "positive triple": (*TRIPLE, (0.0, 1, 1), (-1, 1, 1)),
@@ -119,6 +132,14 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "bodies": BODIES,
     "ranges": ("abc", 3, {3: UNIFORM}, {"shape_mu": 1.0}, {"shape_mu": {"cube": 0.5}}, {"shape_mu": {3: UNIFORM}}, [1]),
     "mask": MASK,
+    "objectives": ("arm/fr3_hand", 3, [], [3], None, THING, tl.Posture(), [tl.Reach("nowhere")]),
+    # the daemon knows the frames, and refuses others with the first problems
+    "daemon objectives": ("arm/fr3_hand", 3, [], [3], None, THING, tl.Posture()),
+    "points": POINTS,
+    "rows": ("abc", THING, 3.0, np.full(3, 1j), np.zeros((1, 2, 3)), np.full(3, NAN), np.zeros((0, 3))),
+    "quaternions": (*POINTS[:3], np.zeros(3), np.zeros(4), np.ones((2, 4)), np.full(4, NAN)),
+    "weights": (-1.0, NAN, INF, "abc", (1, 2), (1, 2, -1), (1, NAN, 2), THING, 1j),
+    "posture weight": (-1.0, 0.0, NAN, INF, "abc", [[1.0]], [1.0, -1.0], THING, 1j),
     "seed": (-1, 1.5, "abc", [1], 2**64, True, NAN, THING, [1, -1], [1, "a"]),
     "command": COMMAND,
     "coordinates": (*ARRAY, np.zeros(14), np.zeros(12)),

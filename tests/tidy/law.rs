@@ -30,6 +30,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "device",
             "portable",
             "memory",
+            "shared",
             "workers",
             "program",
             "batch_op",
@@ -113,6 +114,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "random",
             "start",
             "backend",
+            "auto",
             "snapshot",
             "options",
             "simulation",
@@ -126,7 +128,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src/backend",
         &[
-            "error", "frozen", "state", "input", "noise", "gather", "cpu", "gpu",
+            "error", "frozen", "state", "input", "noise", "gather", "sharing", "cpu", "gpu",
         ],
     ),
     (
@@ -166,11 +168,35 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "sizing",
             "tile",
             "imported",
+            "shared_commands",
+            "shared",
             "backend",
+            "sharing",
             "worlds",
             "frame",
             "create",
             "offline",
+        ],
+    ),
+    (
+        "sim-core/ik/src",
+        &[
+            "error",
+            "task",
+            "frames",
+            "random",
+            "rotation",
+            "followers",
+            "plan",
+            "tables",
+            "measure",
+            "step",
+            "lanes",
+            "check",
+            "starts",
+            "queue",
+            "dispatch",
+            "solver",
         ],
     ),
     (
@@ -186,14 +212,17 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "header",
             "journal_header",
             "guard",
+            "forked",
             "hash",
             "mapping",
             "problem",
             "storage",
             "port",
+            "reentrant",
             "service",
             "error",
             "description",
+            "timing",
             "control",
             "hook",
             "paths",
@@ -204,11 +233,14 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "table",
             "digest",
             "descriptors",
+            "device_memory",
             "transport",
             "turn",
             "connection",
             "heartbeat",
             "affinity",
+            "clock",
+            "park",
             "waiter",
             "command",
             "cgroup",
@@ -219,7 +251,22 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "observer",
             "journal",
             "client",
+            "on_device",
             "host",
+        ],
+    ),
+    (
+        "sim-daemon/client-c/src",
+        &[
+            "status",
+            "pointers",
+            "handle",
+            "staged",
+            "description",
+            "frame",
+            "client",
+            "calls",
+            "timing",
         ],
     ),
     (
@@ -233,10 +280,13 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "environment",
             "devices",
             "list",
+            "top",
             "inspect",
             "refusal",
             "snapshot",
+            "ik",
             "export",
+            "device_memory",
             "arrays",
             "advice",
             "recording",
@@ -246,6 +296,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "fault_log",
             "server",
             "watchdog",
+            "pace",
             "session",
             "commands",
         ],
@@ -262,6 +313,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "client",
             "scene",
             "dynamics",
+            "ik",
             "arrays",
             "picture",
             "observe",
@@ -297,11 +349,12 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 27] = [
+pub const UNSAFE: [&str; 38] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
     "sim-core/device/src/software/exit.rs",        // process exit beside a driver thread
+    "sim-core/device/src/vulkan/export.rs",        // the driver's memory for other processes
     "sim-core/device/src/vulkan/memory.rs",        // the driver's memory, and the host's
     "sim-core/device/src/vulkan/mod.rs",           // the driver's handles
     "sim-core/device/src/vulkan/pipeline.rs",      // as mod.rs
@@ -316,12 +369,22 @@ pub const UNSAFE: [&str; 27] = [
     "sim-core/engine/src/backend/gpu/imported.rs", // memory of readers that a device writes to
     "sim-core/engine/src/backend/mod.rs",          // as imported.rs
     "sim-core/engine/src/simulation.rs",           // as imported.rs
+    "sim-core/ik/src/dispatch.rs",                 // instruction sets
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
     "sim-core/physics/src/lane/simd.rs", // intrinsics
+    "sim-daemon/client-c/src/calls.rs", // pointers of C, which pointers.rs checks
+    "sim-daemon/client-c/src/client.rs", // as calls.rs
+    "sim-daemon/client-c/src/description.rs", // pointers to texts of the same struct
+    "sim-daemon/client-c/src/frame.rs", // as calls.rs
+    "sim-daemon/client-c/src/timing.rs", // as calls.rs
+    "sim-daemon/client-c/src/pointers.rs", // what C passes: texts, arrays, places of results
+    "sim-daemon/protocol/src/forked.rs", // a handler of forks
     "sim-daemon/protocol/src/frame.rs", // views of a sample
+    "sim-daemon/protocol/src/park.rs",  // the descriptor of a listener
     "sim-daemon/protocol/src/loaned.rs", // loaned samples
     "sim-daemon/protocol/src/mapping.rs", // mapped files, and those that somebody cuts
     "sim-daemon/protocol/src/port.rs",  // ports that are dropped or left alone
+    "sim-daemon/protocol/src/reentrant.rs", // a value that a lock abandons
     "sim-daemon/protocol/src/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
     "sim-daemon/src/server.rs",         // samples that a device writes to

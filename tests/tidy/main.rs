@@ -78,8 +78,10 @@ fn sources() -> Vec<String> {
         "sim-core/model/src",
         "sim-core/device/src",
         "sim-core/engine/src",
+        "sim-core/ik/src",
         "sim-core/stages",
         "sim-daemon/src",
+        "sim-daemon/client-c/src",
         "sim-daemon/protocol/src",
         "sim-daemon/picture/src",
         "py-client/src",
@@ -151,7 +153,21 @@ fn crates_know_only_what_they_may() {
         ),
         ("sim-core/engine/src", &["sim_protocol", "sim_daemon"]),
         (
+            "sim-core/ik/src",
+            &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+        ),
+        (
             "sim-daemon/protocol/src",
+            &[
+                "sim_physics",
+                "sim_model",
+                "sim_device",
+                "sim_engine",
+                "sim_daemon",
+            ],
+        ),
+        (
+            "sim-daemon/client-c/src",
             &[
                 "sim_physics",
                 "sim_model",
@@ -173,7 +189,13 @@ fn crates_know_only_what_they_may() {
         ),
         (
             "py-client/src",
-            &["sim_physics", "sim_model", "sim_device", "sim_engine"],
+            &[
+                "sim_physics",
+                "sim_model",
+                "sim_device",
+                "sim_engine",
+                "sim_ik",
+            ],
         ),
     ] {
         for path in files(folder, ".rs") {
@@ -342,6 +364,7 @@ fn pages_of_code_are_at_most_500_lines() {
         "sim-core/device/benches",
         "sim-core/device/tests",
         "sim-daemon/tests",
+        "sim-daemon/client-c/tests",
     ];
     let long: Vec<String> = python
         .iter()
@@ -384,4 +407,20 @@ fn paths_named_in_the_documents_exist() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// pytest imports tests by their file's name alone, and refuses all of them at the second of one name.
+#[test]
+fn python_tests_have_names_of_their_own() {
+    let mut seen = BTreeSet::new();
+    for path in files("tests/python", ".py")
+        .into_iter()
+        .chain(files("py-client/tests", ".py"))
+    {
+        let name = path.rsplit('/').next().unwrap().to_owned();
+        assert!(
+            !name.starts_with("test_") || seen.insert(name),
+            "{path}: another folder has tests of this name"
+        );
+    }
 }
