@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from planning.problem import Array, Problem
 
 import tightloop as tl
+from planning.problem import Array, Problem
 from tightloop import assets
 
 # Weights of the residuals: position [1/m], both parts of the angle, velocities [s/m, s/rad]

@@ -16,10 +16,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from planning.cartpole import CartPole
-from planning.problem import Array
 
 import tightloop as tl
+from planning.cartpole import CartPole
+from planning.problem import Array
 
 STEPS = (1.0, 0.6, 0.3, 0.1, 0.03)  # α [–]
 REGULARISATIONS = (1e-6, 1e-2, 1.0)  # μ [–]

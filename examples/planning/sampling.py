@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from planning.problem import Array, Problem
 
 import tightloop as tl
+from planning.problem import Array, Problem
 
 
 class Sampling:

@@ -289,7 +289,7 @@ CALLS: dict[str, Call] = {
         {"eps": "positive", "centered": "flag", "sensors": "flag"},
         {},
         dict.fromkeys(
-            ("sim", "worlds", "controls", "commands", "planner"),
+            ("sim", "worlds", "controls", "commands", "states", "planner"),
             "forms of its own: tests/python/mujoco/test_linearize.py tries them",
         ),
     ),

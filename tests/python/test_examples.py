@@ -17,7 +17,7 @@ EXAMPLES = REPOSITORY / "examples"
 RUNS = {
     "franka_lesson.py": ("--worlds 4 --precision f64 --out {out}", r"distance from MuJoCo C +\d\.\de-\d\d"),
     "franka_grasp.py": ("--worlds 8 --out {out}", r"\d+ of 8 worlds lifted the cube"),
-    "mpc.py": ("--seeds 1", r"1 of 1 seeds stand in the last second"),
+    "mpc.py": ("cartpole --planner ilqr --seeds 1", r"1 of 1 seeds succeed"),
     "newton_ik_lesson.py": ("--worlds 4", r"the hand is [01]\.\d mm off its target in the mean, [0-4]\.\d mm at most"),
     "newton_lesson.py": ("--worlds 4", r"target demo: joint 4 from -2\.\d+ to -1\.\d+ rad"),
     "own_task.py": ("", r"mean reward of random actions: \d"),

@@ -133,7 +133,7 @@ def linearize(
     if there:
         snapshot = snapshot.of_worlds(np.zeros(count, np.intp))
     labels = [f"state {index}" for index in range(count)] if there else [f"world {world}" for world in chosen]
-    found = _Run(planner, name, given, there, displaced, sensors).jacobians(snapshot, labels)
+    found = _Run(planner, name, given, there, displaced=displaced, sensors=sensors).jacobians(snapshot, labels)
     if there or worlds is None or np.ndim(worlds):
         return found
     a, b, c, d = (None if part is None else part[0] for part in found)
@@ -172,6 +172,7 @@ class _Run:
         name: str,
         given: dict[str, Array],
         states: dict[str, Array],
+        *,
         displaced: _Displaced,
         sensors: bool,
     ) -> None:
@@ -314,6 +315,9 @@ def _states(sim: Sim, states: Any, chosen: NDArray[np.intp]) -> dict[str, Array]
         array = reals(f"linearize: states: {name}", value)
         if array.ndim != 2 or array.shape[1] != known[name] or not len(array):
             raise ArgumentError(f"linearize: states: {name} has shape {array.shape}; give (n, {known[name]})")
+        wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
+        if wrong.size:
+            raise ArgumentError(f"linearize: states: {name} of state {wrong[0]} is not finite; give finite numbers")
         given[name] = array.astype(np.float64)
     if len({len(array) for array in given.values()}) != 1:
         found = ", ".join(f"{name} {len(array)}" for name, array in given.items())

@@ -252,6 +252,47 @@ def test_wrong_arguments_of_linearize_are_named_with_a_cure(pendulum, arguments,
         tl.linearize(sim, **arguments)
 
 
+def test_states_of_a_trajectory_are_linearized_as_one_by_one():
+    model = exact(mujoco.MjModel.from_xml_string(EVERY_JOINT))
+    made = states(model, 1)
+    joint_q, joint_qd = to_joints(model, np.stack([one.qpos for one in made]), np.stack([one.qvel for one in made]))
+    given = {"joint_q": joint_q, "joint_qd": joint_qd, "act": np.stack([one.act for one in made])}
+    ctrl = np.stack([one.ctrl for one in made])
+    with tl.launch(tl.Scene.from_mujoco(model), worlds=2, precision="f64", fields=("qpos",)) as sim:
+        before = sim.forward().copy()
+        found = tl.linearize(sim, 1, states=given, commands={"ctrl": ctrl}, sensors=True)
+        assert np.array_equal(sim.forward().qpos, before.qpos)
+        for index in range(len(made)):
+            sim.write(**{name: values[index] for name, values in given.items()})
+            alone = tl.linearize(sim, 0, commands={"ctrl": ctrl[index]}, sensors=True)
+            for name in "ABCD":
+                assert np.array_equal(getattr(found, name)[index], getattr(alone, name)), f"{name} of state {index}"
+        # what is left out is that of the world
+        half = tl.linearize(sim, 1, states={"joint_qd": joint_qd}, commands={"ctrl": ctrl[-1]})
+        assert np.array_equal(half.A[-1], alone.A) and not np.array_equal(half.A[0], found.A[0])
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({}, "states is {}; give a dict by name, of joint_q, joint_qd"),
+        (np.zeros((3, 2)), "states is array"),
+        ({"qpos": np.zeros((3, 2))}, "states has 'qpos'"),
+        ({"act": np.zeros((3, 0))}, "states has 'act'"),
+        ({"joint_q": np.zeros(2)}, r"states: joint_q has shape \(2,\); give \(n, 2\)"),
+        ({"joint_q": np.zeros((0, 2))}, r"states: joint_q has shape \(0, 2\); give \(n, 2\)"),
+        ({"joint_q": np.zeros((3, 2)), "joint_qd": np.zeros((4, 2))}, "different numbers: joint_q 3, joint_qd 4"),
+        ({"joint_q": np.array([[0, 0], [0, np.nan]])}, "joint_q of state 1 is not finite"),
+    ],
+)
+def test_wrong_states_are_named_with_a_cure(pendulum, given, match):
+    with tl.launch(pendulum, worlds=3) as sim:
+        with pytest.raises(tl.ArgumentError, match=match):
+            tl.linearize(sim, 0, states=given)
+        with pytest.raises(tl.ArgumentError, match="belong to one world, and worlds has 3"):
+            tl.linearize(sim, states={"joint_q": np.zeros((3, 2))})
+
+
 def test_planners_that_do_not_fit_and_faulted_worlds_are_refused(pendulum):
     with tl.launch(pendulum, worlds=2) as sim:
         with pytest.raises(tl.ArgumentError, match="planner is the simulation itself"):
