@@ -180,3 +180,93 @@ fn move_free<F: Lane>(turning: &Turning<F::Real>, from: &[F], delta: &[F], to: &
     to[c..c + 3].copy_from_slice(&*position);
     to[c + 3..c + 7].copy_from_slice(&q);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::frame;
+    use crate::measure::{Normal, Target, normal_equations, place};
+    use crate::plan::Plan;
+    use crate::task::{Reach, Task};
+    use sim_model::{Description, UrdfOptions};
+    use std::path::Path;
+
+    /// Step of a difference [rad or m].
+    const STEP: f64 = 1e-6;
+
+    #[test]
+    fn the_gradient_is_that_of_the_cost_for_every_kind_of_joint() {
+        let path = "sim-core/stages/recorded/tests/record_stages/every_joint.urdf";
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../..")
+            .join(path);
+        let options = UrdfOptions {
+            name: Some("robot".to_owned()),
+            floating: true,
+            ..UrdfOptions::default()
+        };
+        let mut scene = Description::new(0.002, 1);
+        scene.add_urdf(path, options).unwrap();
+        let model = scene.compile().unwrap();
+        let named = |name: &str| frame(&model, name).unwrap();
+        let reach = |name: &str, other: Option<&str>| Reach {
+            name: name.to_owned(),
+            frame: named(name),
+            relative_to: other.map(named),
+            position_weight: [1.0, 2.0, 0.5],
+            orientation_weight: [0.7; 3],
+        };
+        let task = Task {
+            reaches: vec![
+                reach("robot/camera", None),
+                reach("robot/thumb", Some("robot/camera")),
+                reach("robot/finger", None),
+            ],
+            moves: vec![true; model.dofs()],
+            limits: false,
+            posture_weight: vec![0.0; model.dofs()],
+        };
+        let plan = Plan::new(&model, &task).unwrap();
+        let t = &Tables::<f64>::new(&model, &plan);
+        let mut block: Block<f64, f64> = t.block();
+        let mut q: Vec<f64> = (0..model.coords())
+            .map(|c| (c as f64).sin() * 0.4)
+            .collect();
+        for c in t.constants.quaternions() {
+            q[c..c + 4].copy_from_slice(&[0.5, -0.1, 0.7, 0.5]);
+        }
+        let target = Target {
+            position: Vec3([0.2, -0.3, 0.4]),
+            axes: sim_physics::math::quat::matrix([0.6, 0.0, 0.0, 0.8]),
+        };
+        let targets = [target; 3];
+        let mut slopes = vec![0.0; t.followers.len()];
+        assert!(!slopes.is_empty());
+        let mut n = Normal::new(t);
+        let mut evaluate = |delta: &[f64], n: &mut Normal<f64>| {
+            block.joint_q.copy_from_slice(&q);
+            moved(t, &q, delta, &mut block.joint_q);
+            place(t, &mut block, &mut slopes);
+            normal_equations(t, &block, &slopes, &targets, [1.0; 2], n);
+        };
+        let mut delta = vec![0.0; t.coord_of.len()];
+        evaluate(&delta, &mut n);
+        let gradient = n.gradient.clone();
+        assert!(gradient.iter().all(|g| g.abs() > 1e-6), "{gradient:?}");
+        for v in 0..delta.len() {
+            let mut cost = |step: f64| {
+                delta[v] = step;
+                evaluate(&delta, &mut n);
+                delta[v] = 0.0;
+                n.cost
+            };
+            let difference = (cost(STEP) - cost(-STEP)) / (2.0 * STEP);
+            // a third derivative of about 10, times the square of the step, and roundings of the cost over it
+            assert!(
+                (difference - gradient[v]).abs() < 1e-8,
+                "variable {v}: {difference}, not {}",
+                gradient[v]
+            );
+        }
+    }
+}

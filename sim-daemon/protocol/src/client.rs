@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::command::{Call, Command};
-use crate::connection::{ANSWER_MAX, Connection, malformed};
+use crate::connection::{Connection, malformed};
 use crate::control::{Request, Response};
 use crate::controller::Controller;
 use crate::described;
@@ -16,7 +16,6 @@ use crate::hook::Hook;
 use crate::journal::Journal;
 use crate::liveness::Peer;
 use crate::observer::Observer;
-use crate::paths::{DaemonPaths, Presence};
 use crate::transport;
 use crate::turn::{Held, Turn};
 use crate::{Description, Frame, Op, ProtocolError, Timing};
@@ -470,28 +469,7 @@ impl Client {
     pub fn shutdown(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         self.release(hook)?;
         self.observer.take(hook)?.take();
-        match self.connection.ask(&Request::Shutdown, hook) {
-            Ok(_)
-            | Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => {}
-            Err(error) => return Err(error),
-        }
-        let start = Instant::now();
-        // the daemon goes after its groups
-        let (peer, daemon) = (&self.connection.peer, self.connection.peer.paths.daemon()?);
-        let runs = |paths: &DaemonPaths| match paths.presence() {
-            Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
-            _ => false,
-        };
-        while self.check_alive().is_ok() || runs(&daemon) {
-            if start.elapsed() > ANSWER_MAX {
-                return Err(self.connection.peer.timeout(ANSWER_MAX));
-            }
-            if hook().is_break() {
-                return Err(ProtocolError::Interrupted);
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Ok(())
+        self.connection.shut_down(hook)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::described::{self, Damage};
 use crate::guard::guarded;
 use crate::hook::Hook;
 use crate::liveness::Peer;
+use crate::paths::{DaemonPaths, Presence};
 use crate::port::Port;
 use crate::service::AnyThread;
 use crate::transport::{self, Requester, SLICE, Waker, handshake};
@@ -170,6 +171,31 @@ impl Connection {
             std::thread::sleep(nap);
             nap = (nap * 3 / 2).min(Duration::from_millis(1));
         }
+    }
+
+    /// Ends the daemon, and returns when it is gone: after its groups.
+    pub(crate) fn shut_down(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        match self.ask(&Request::Shutdown, hook) {
+            Ok(_)
+            | Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        let start = Instant::now();
+        let (peer, daemon) = (&self.peer, self.peer.paths.daemon()?);
+        let runs = |paths: &DaemonPaths| match paths.presence() {
+            Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
+            _ => false,
+        };
+        while peer.check().is_ok() || runs(&daemon) {
+            if start.elapsed() > ANSWER_MAX {
+                return Err(peer.timeout(ANSWER_MAX));
+            }
+            if hook().is_break() {
+                return Err(ProtocolError::Interrupted);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(())
     }
 
     /// Says that we are alive, unless a request that is waited for says so: too many that are unread would push it out.

@@ -207,10 +207,7 @@ impl Waiter {
 }
 
 /// Looks for something over and over until a time.
-fn spin_until<T>(
-    end: Instant,
-    awaited: &mut impl Awaited<T>,
-) -> Result<Option<T>, ProtocolError> {
+fn spin_until<T>(end: Instant, awaited: &mut impl Awaited<T>) -> Result<Option<T>, ProtocolError> {
     loop {
         for _ in 0..LOOKS {
             if let Some(found) = awaited.poll()? {
