@@ -60,7 +60,7 @@ mod core {
     #[pymodule_export]
     use super::frame::{PyFrame, Sample};
     #[pymodule_export]
-    use super::ik::Ik;
+    use super::ik::{Ik, IkTaskSolver};
     #[pymodule_export]
     use super::observe::{Evaluation, Playback};
     #[pymodule_export]

@@ -177,11 +177,12 @@ class IkSolver:
             what |= {f"position of `{reach.frame}`": place, f"orientation of `{reach.frame}`": turn}
         counts = {name: len(array) for name, array in what.items() if array.ndim == 2}
         if start is None:  # those of the worlds
-            counts["present positions of the worlds"] = self._worlds
-        count = max(counts.values(), default=1)
+            counts["the present state of the worlds"] = self._worlds
+        most = max(counts, key=lambda name: counts[name], default="")
+        count = counts.get(most, 1)
         for name, given in counts.items():
             if given not in (1, count):
-                raise ArgumentError(f"solve: {name} has {given} rows, and others have {count}; give all of one number")
+                raise ArgumentError(f"solve: {name} has {given} rows, and {most} has {count}; give all of one number")
         arrays = [np.empty(0) if start is None else start, np.asarray(posture)]
         for pair in zip(positions, orientations, strict=True):
             arrays += pair

@@ -18,6 +18,7 @@ LATE = ("pause", "hold", "stop")
 PRIORITY_MAX = 99
 
 
+@checked_calls
 @dataclass(frozen=True, slots=True)
 class RealTime:
     """How a simulation keeps to real time: each frame leaves when it is due on the monotonic clock.
