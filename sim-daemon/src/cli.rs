@@ -301,7 +301,7 @@ pub(crate) struct Bench {
     #[arg(long, default_value_t = 2.5)]
     pub(crate) seconds: f64,
 
-    /// Worlds per block: 1, 8 (AVX2) or 16 (AVX-512); default: the most that the processor has.
+    /// Worlds per block: 1, 8 (AVX2, NEON) or 16 (AVX-512); default: the most that the processor has.
     #[arg(long)]
     pub(crate) lanes: Option<usize>,
 

@@ -349,7 +349,7 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 38] = [
+pub const UNSAFE: [&str; 39] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -371,7 +371,8 @@ pub const UNSAFE: [&str; 38] = [
     "sim-core/engine/src/simulation.rs",           // as imported.rs
     "sim-core/ik/src/dispatch.rs",                 // instruction sets
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
-    "sim-core/physics/src/lane/simd.rs", // intrinsics
+    "sim-core/physics/src/lane/simd/neon.rs", // intrinsics
+    "sim-core/physics/src/lane/simd/x86.rs", // intrinsics
     "sim-daemon/client-c/src/calls.rs", // pointers of C, which pointers.rs checks
     "sim-daemon/client-c/src/client.rs", // as calls.rs
     "sim-daemon/client-c/src/description.rs", // pointers to texts of the same struct

@@ -115,8 +115,7 @@ machine!(
     sixteen sim_physics::lane::simd::F32x16
 );
 machine!(
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2")]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     eight sim_physics::lane::simd::F32x8
 );
 
@@ -137,16 +136,14 @@ pub fn scalar(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Left> 
 /// Single precision, in every register that this processor has.
 pub fn registers(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Vec<Left>> {
     let mut found = Vec::new();
+    if available(Lanes::Eight) {
+        // SAFETY: as just asked.
+        found.push(unsafe { eight(stages_f32x8::STAGES[stage.index()], m, stage, given) });
+    }
     #[cfg(target_arch = "x86_64")]
-    {
-        if available(Lanes::Eight) {
-            // SAFETY: as just asked.
-            found.push(unsafe { eight(stages_f32x8::STAGES[stage.index()], m, stage, given) });
-        }
-        if available(Lanes::Sixteen) {
-            // SAFETY: as just asked.
-            found.push(unsafe { sixteen(stages_f32x16::STAGES[stage.index()], m, stage, given) });
-        }
+    if available(Lanes::Sixteen) {
+        // SAFETY: as just asked.
+        found.push(unsafe { sixteen(stages_f32x16::STAGES[stage.index()], m, stage, given) });
     }
     found
 }

@@ -81,7 +81,7 @@ pub enum Lanes {
     Auto,
     /// One.
     Scalar,
-    /// Eight, AVX2.
+    /// Eight: AVX2 or NEON.
     Eight,
     /// Sixteen, AVX-512.
     Sixteen,

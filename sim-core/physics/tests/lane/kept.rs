@@ -1,8 +1,6 @@
 //! Tables of the model and kept lists on the CPU backends.
 
 use crate::toy::{self, contacts};
-#[cfg(target_arch = "x86_64")]
-use crate::wide::{has_eight, has_sixteen};
 use crate::{bits, inputs};
 use sim_physics::lane::{Cx, Lane, Table, Tables};
 use sim_physics::push;
@@ -18,21 +16,7 @@ fn contacts_of<F: Lane>(worlds: &[[F::Real; 3]]) -> Vec<Vec<F::Real>> {
     )
 }
 
-#[cfg(target_arch = "x86_64")]
-mod wide {
-    use super::contacts_of;
-    use sim_physics::lane::simd::{F32x8, F32x16};
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn contacts_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        contacts_of::<F32x8>(worlds)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn contacts_by_sixteen(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        contacts_of::<F32x16>(worlds)
-    }
-}
+in_every_width!(contacts_in_every_width = contacts_of(worlds: &[[f32; 3]]) -> Vec<Vec<f32>>);
 
 #[test]
 fn the_texts_of_these_tests_take_every_path() {
@@ -47,37 +31,19 @@ fn the_texts_of_these_tests_take_every_path() {
     assert!(column(5).any(|largest| largest > 0.0) && column(5).any(|largest| largest == 0.0));
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn kept_lists_are_bitwise_the_same_in_every_width_and_order() {
     let worlds = inputs(200);
     let order: Vec<usize> = (0..200).map(|i| (i * 37 + 5) % 200).collect();
     let permuted: Vec<_> = order.iter().map(|i| worlds[*i]).collect();
     let one = bits(&contacts_of::<f32>(&worlds));
-    let check = |straight: Vec<Vec<f32>>, other: Vec<Vec<f32>>| {
-        assert_eq!(bits(&straight), one);
-        let other = bits(&other);
-        for (i, result) in order.iter().zip(&other) {
-            assert_eq!(result, &one[*i]);
-        }
-    };
-    if has_eight() {
-        // SAFETY: the processor has the features (checked above)
-        unsafe {
-            check(
-                wide::contacts_by_eight(&worlds),
-                wide::contacts_by_eight(&permuted),
-            )
-        };
+    for (width, found) in contacts_in_every_width(&worlds) {
+        assert_eq!(bits(&found), one, "{width} worlds");
     }
-    if has_sixteen() {
-        // SAFETY: the processor has the features (checked above)
-        unsafe {
-            check(
-                wide::contacts_by_sixteen(&worlds),
-                wide::contacts_by_sixteen(&permuted),
-            )
-        };
+    for (width, found) in contacts_in_every_width(&permuted) {
+        for (i, result) in order.iter().zip(&bits(&found)) {
+            assert_eq!(result, &one[*i], "{width} worlds");
+        }
     }
 }
 

@@ -1,7 +1,5 @@
 //! The CPU backends: the same code gives the same bits for every width of a block.
 
-mod kept;
-mod sincos;
 #[path = "../../../record/tests/toy/mod.rs"]
 mod toy;
 
@@ -95,65 +93,63 @@ fn scalar(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
     )
 }
 
-#[cfg(target_arch = "x86_64")]
-mod wide {
-    use super::*;
-    use sim_physics::lane::simd::{F32x8, F32x16};
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn solve_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        toy::on_cpu_with(
-            worlds,
-            POINTS_SCRATCH,
-            &Tables::default(),
-            |cx, x: &[F32x8]| solve(cx, x),
-        )
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn solve_by_sixteen(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        toy::on_cpu_with(
-            worlds,
-            POINTS_SCRATCH,
-            &Tables::default(),
-            |cx, x: &[F32x16]| solve(cx, x),
-        )
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn run_by_eight(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
-        toy::on_cpu::<F32x8>(steps, worlds)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn run_by_sixteen(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
-        toy::on_cpu::<F32x16>(steps, worlds)
-    }
-
-    #[target_feature(enable = "avx2,fma")]
-    pub fn add_by_eight(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
-        let (scratch, tables) = (POINTS_SCRATCH, Tables::default());
-        toy::on_cpu_with(worlds, scratch, &tables, |cx, x: &[F32x8]| {
-            add_to_zero(cx, x)
-        })
-    }
-
-    pub fn has_eight() -> bool {
-        let has = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-        if !has {
-            println!("skipped: no AVX2");
+/// A function that calls a generic one with each register type of this processor, where its instructions are allowed. It
+/// returns the results with their widths.
+macro_rules! in_every_width {
+    ($name:ident = $generic:ident($($argument:ident: $type:ty),*) -> $result:ty) => {
+        fn $name($($argument: $type),*) -> Vec<(usize, $result)> {
+            #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+            unsafe fn eight($($argument: $type),*) -> $result {
+                $generic::<sim_physics::lane::simd::F32x8>($($argument),*)
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f")]
+            unsafe fn sixteen($($argument: $type),*) -> $result {
+                $generic::<sim_physics::lane::simd::F32x16>($($argument),*)
+            }
+            let widths = sim_physics::lane::simd::widths();
+            assert!(widths.eight, "every processor that is supported has registers of eight worlds");
+            // SAFETY: the processor has the instructions (just asked)
+            let narrow = (8, unsafe { eight($($argument),*) });
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as just asked
+            let wide = widths.sixteen.then(|| (16, unsafe { sixteen($($argument),*) }));
+            #[cfg(not(target_arch = "x86_64"))]
+            let wide = None;
+            if wide.is_none() {
+                println!("16 worlds skipped: no AVX-512");
+            }
+            std::iter::once(narrow).chain(wide).collect()
         }
-        has
-    }
-
-    pub fn has_sixteen() -> bool {
-        let has = is_x86_feature_detected!("avx512f");
-        if !has {
-            println!("skipped: no AVX-512");
-        }
-        has
-    }
+    };
 }
+
+mod kept;
+mod sincos;
+
+#[inline(always)]
+fn solved<F: Lane<Real = f32>>(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+    toy::on_cpu_with(worlds, POINTS_SCRATCH, &Tables::default(), |cx, x: &[F]| {
+        solve(cx, x)
+    })
+}
+
+#[inline(always)]
+fn added<F: Lane<Real = f32>>(worlds: &[[f32; 3]]) -> Vec<Vec<f32>> {
+    let (scratch, tables) = (POINTS_SCRATCH, Tables::default());
+    toy::on_cpu_with(worlds, scratch, &tables, |cx, x: &[F]| add_to_zero(cx, x))
+}
+
+#[inline(always)]
+fn ran<F: Lane<Real = f32>>(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>> {
+    toy::on_cpu::<F>(steps, worlds)
+}
+
+in_every_width!(solve_in_every_width = solved(worlds: &[[f32; 3]]) -> Vec<Vec<f32>>);
+in_every_width!(add_in_every_width = added(worlds: &[[f32; 3]]) -> Vec<Vec<f32>>);
+in_every_width!(run_in_every_width = ran(steps: &[toy::Step], worlds: &[[f32; toy::INPUTS]]) -> Vec<Vec<f32>>);
+in_every_width!(count_down_in_every_width = counted_down(worlds: &[[f32; 1]]) -> Vec<Vec<f32>>);
+in_every_width!(scatter_in_every_width = scattered() -> ());
 
 fn bits(worlds: &[Vec<f32>]) -> Vec<Vec<u32>> {
     worlds
@@ -162,26 +158,14 @@ fn bits(worlds: &[Vec<f32>]) -> Vec<Vec<u32>> {
         .collect()
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
-fn eight_worlds_a_block_equal_one_bitwise() {
-    if wide::has_eight() {
-        // 27: a block that is not full, too
-        let worlds = inputs(27);
-        // SAFETY: the processor has the features (checked above)
-        let eight = unsafe { wide::solve_by_eight(&worlds) };
-        assert_eq!(bits(&eight), bits(&scalar(&worlds)));
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[test]
-fn sixteen_worlds_a_block_equal_one_bitwise() {
-    if wide::has_sixteen() {
-        let worlds = inputs(75);
-        // SAFETY: the processor has the features (checked above)
-        let sixteen = unsafe { wide::solve_by_sixteen(&worlds) };
-        assert_eq!(bits(&sixteen), bits(&scalar(&worlds)));
+fn worlds_of_a_block_equal_one_bitwise() {
+    // blocks that are not full, too
+    for count in [27, 75] {
+        let worlds = inputs(count);
+        for (width, found) in solve_in_every_width(&worlds) {
+            assert_eq!(bits(&found), bits(&scalar(&worlds)), "{width} worlds");
+        }
     }
 }
 
@@ -197,72 +181,51 @@ fn the_text_of_these_tests_takes_every_path() {
     );
 }
 
-#[cfg(target_arch = "x86_64")]
-#[test]
-fn a_world_writes_its_place_of_its_own_row_and_nothing_beyond_the_memory() {
-    use sim_physics::lane::simd::{F32x8, F32x16};
-    fn check<F: Lane<Real = f32>>() {
-        let number = |f: &dyn Fn(usize) -> usize| {
-            F::load(&(0..F::WIDTH).map(|w| f(w) as f32).collect::<Vec<_>>())
-        };
-        let x = number(&|w| 100 + w);
-        let rows = number(&|w| w * 5 % 7);
-        let odd = number(&|w| w % 2);
-        let mut to = vec![F::c(-1.0); 2 * 6 + 1];
-        x.scatter(F::c(0.5).lt(odd), &mut to, rows, 2);
-        for (place, register) in to.iter().enumerate() {
-            for w in 0..F::WIDTH {
-                let written = w % 2 == 1 && place == w * 5 % 7 * 2;
-                let expected = if written { 100.0 + w as f32 } else { -1.0 };
-                assert_eq!(register.lane(w), expected, "world {w} of register {place}");
-            }
+fn scattered<F: Lane<Real = f32>>() {
+    let number = |f: &dyn Fn(usize) -> usize| {
+        F::load(&(0..F::WIDTH).map(|w| f(w) as f32).collect::<Vec<_>>())
+    };
+    let x = number(&|w| 100 + w);
+    let rows = number(&|w| w * 5 % 7);
+    let odd = number(&|w| w % 2);
+    let mut to = vec![F::c(-1.0); 2 * 6 + 1];
+    x.scatter(F::c(0.5).lt(odd), &mut to, rows, 2);
+    for (place, register) in to.iter().enumerate() {
+        for w in 0..F::WIDTH {
+            let written = w % 2 == 1 && place == w * 5 % 7 * 2;
+            let expected = if written { 100.0 + w as f32 } else { -1.0 };
+            assert_eq!(register.lane(w), expected, "world {w} of register {place}");
         }
-        // world 4 is the only one of row 6: the memory ends before it
-        let even = !F::c(0.5).lt(odd);
-        let panics = |mask: F::Mask, len: usize| {
-            let mut to = vec![F::c(0.0); len];
-            let scatter = || x.scatter(mask, &mut to, rows, 2);
-            std::panic::catch_unwind(std::panic::AssertUnwindSafe(scatter)).is_err()
-        };
-        assert!(panics(even, 12) && !panics(even, 13));
-        assert!(panics(F::all(), 0) && panics(F::all(), 1));
     }
-    if wide::has_eight() {
-        check::<F32x8>();
-    }
-    if wide::has_sixteen() {
-        check::<F32x16>();
-    }
+    // world 4 is the only one of row 6: the memory ends before it
+    let even = !F::c(0.5).lt(odd);
+    let panics = |mask: F::Mask, len: usize| {
+        let mut to = vec![F::c(0.0); len];
+        let scatter = || x.scatter(mask, &mut to, rows, 2);
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(scatter)).is_err()
+    };
+    assert!(panics(even, 12) && !panics(even, 13));
+    assert!(panics(F::all(), 0) && panics(F::all(), 1));
 }
 
-#[cfg(target_arch = "x86_64")]
+#[test]
+fn a_world_writes_its_place_of_its_own_row_and_nothing_beyond_the_memory() {
+    scatter_in_every_width();
+}
+
 #[test]
 fn order_of_worlds_does_not_change_their_bits() {
     let worlds = inputs(64);
     let order: Vec<usize> = (0..64).map(|i| (i * 37 + 5) % 64).collect();
     let permuted: Vec<_> = order.iter().map(|i| worlds[*i]).collect();
-    let check = |straight: Vec<Vec<f32>>, other: Vec<Vec<f32>>| {
+    let both = solve_in_every_width(&worlds)
+        .into_iter()
+        .zip(solve_in_every_width(&permuted));
+    for ((width, straight), (_, other)) in both {
         for (i, result) in order.iter().zip(&other) {
-            assert_eq!(bits(std::slice::from_ref(result)), bits(&straight[*i..=*i]));
+            let (found, expected) = (std::slice::from_ref(result), &straight[*i..=*i]);
+            assert_eq!(bits(found), bits(expected), "{width} worlds");
         }
-    };
-    if wide::has_eight() {
-        // SAFETY: the processor has the features (checked above)
-        unsafe {
-            check(
-                wide::solve_by_eight(&worlds),
-                wide::solve_by_eight(&permuted),
-            )
-        };
-    }
-    if wide::has_sixteen() {
-        // SAFETY: the processor has the features (checked above)
-        unsafe {
-            check(
-                wide::solve_by_sixteen(&worlds),
-                wide::solve_by_sixteen(&permuted),
-            )
-        };
     }
 }
 
@@ -274,7 +237,6 @@ fn same_bits(worlds: &[Vec<f32>]) -> Vec<Vec<u32>> {
         .collect()
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn random_programs_agree_bitwise_in_every_width() {
     for seed in 0..300 {
@@ -282,19 +244,9 @@ fn random_programs_agree_bitwise_in_every_width() {
         let steps = toy::program(&mut random, 3, 4, 12);
         let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 40);
         let one = same_bits(&toy::on_cpu::<f32>(&steps, &worlds));
-        if wide::has_eight() {
-            // SAFETY: the processor has the features (checked above)
-            let eight = unsafe { wide::run_by_eight(&steps, &worlds) };
-            assert_eq!(same_bits(&eight), one, "8 worlds, seed {seed}: {steps:#?}");
-        }
-        if wide::has_sixteen() {
-            // SAFETY: the processor has the features (checked above)
-            let sixteen = unsafe { wide::run_by_sixteen(&steps, &worlds) };
-            assert_eq!(
-                same_bits(&sixteen),
-                one,
-                "16 worlds, seed {seed}: {steps:#?}"
-            );
+        for (width, found) in run_in_every_width(&steps, &worlds) {
+            let found = same_bits(&found);
+            assert_eq!(found, one, "{width} worlds, seed {seed}: {steps:#?}");
         }
     }
 }
@@ -330,28 +282,19 @@ fn countdown<C: Cx>(cx: &mut C, x: &[C::F]) -> Vec<C::F> {
     vec![cx.get(&rounds)]
 }
 
-#[cfg(target_arch = "x86_64")]
+fn counted_down<F: Lane<Real = f32>>(worlds: &[[f32; 1]]) -> Vec<Vec<f32>> {
+    toy::on_cpu_with(worlds, 0, &Tables::default(), |cx, x: &[F]| {
+        countdown(cx, x)
+    })
+}
+
 #[test]
 fn a_world_that_stopped_does_not_move_with_its_neighbours() {
     let worlds: Vec<[f32; 1]> = (0..48).map(|i| [(i * 7 % 48) as f32]).collect();
     let expected: Vec<Vec<f32>> = worlds.iter().map(|x| x.to_vec()).collect();
-    let scalar = toy::on_cpu_with(&worlds, 0, &Tables::default(), |cx, x: &[f32]| {
-        countdown(cx, x)
-    });
-    assert_eq!(scalar, expected);
-    if wide::has_eight() {
-        use sim_physics::lane::simd::F32x8;
-        let eight = toy::on_cpu_with(&worlds, 0, &Tables::default(), |cx, x: &[F32x8]| {
-            countdown(cx, x)
-        });
-        assert_eq!(eight, expected);
-    }
-    if wide::has_sixteen() {
-        use sim_physics::lane::simd::F32x16;
-        let sixteen = toy::on_cpu_with(&worlds, 0, &Tables::default(), |cx, x: &[F32x16]| {
-            countdown(cx, x)
-        });
-        assert_eq!(sixteen, expected);
+    assert_eq!(counted_down::<f32>(&worlds), expected);
+    for (width, found) in count_down_in_every_width(&worlds) {
+        assert_eq!(found, expected, "{width} worlds");
     }
 }
 
@@ -416,16 +359,17 @@ fn a_row_outside_its_table_is_found_in_debug_builds() {
     );
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn what_other_worlds_add_leaves_the_sign_of_a_zero() {
-    if wide::has_eight() {
-        let worlds: Vec<[f32; 3]> = (0..8).map(|k| [k as f32 - 3.5, 0.0, 0.0]).collect();
-        // SAFETY: the processor has the features (checked above)
-        let found = unsafe { wide::add_by_eight(&worlds) };
+    let worlds: Vec<[f32; 3]> = (0..16).map(|k| [k as f32 - 7.5, 0.0, 0.0]).collect();
+    for (width, found) in add_in_every_width(&worlds) {
         for (world, sum) in worlds.iter().zip(&found) {
             let expected = if world[0] > 0.0 { 3.0 * world[0] } else { -0.0 };
-            assert_eq!(sum[0].to_bits(), expected.to_bits(), "{world:?}");
+            assert_eq!(
+                sum[0].to_bits(),
+                expected.to_bits(),
+                "{width} worlds: {world:?}"
+            );
         }
     }
 }

@@ -1,26 +1,11 @@
 //! The project's own sine and cosine.
 
 use crate::toy;
-#[cfg(target_arch = "x86_64")]
-use crate::wide::{has_eight, has_sixteen};
 use sim_physics::lane::{Lane, Num};
 
-#[cfg(target_arch = "x86_64")]
-mod wide {
-    use super::sincos;
-    use sim_physics::lane::simd::{F32x8, F32x16};
+in_every_width!(sincos_in_every_width = sincos(x: &[f32]) -> Vec<(f32, f32)>);
 
-    #[target_feature(enable = "avx2,fma")]
-    pub fn sincos_by_eight(x: &[f32]) -> Vec<(f32, f32)> {
-        sincos::<F32x8>(x)
-    }
-
-    #[target_feature(enable = "avx512f")]
-    pub fn sincos_by_sixteen(x: &[f32]) -> Vec<(f32, f32)> {
-        sincos::<F32x16>(x)
-    }
-}
-
+#[inline(always)]
 fn sincos<F: Lane<Real = f32>>(x: &[f32]) -> Vec<(f32, f32)> {
     let mut results = Vec::new();
     for block in x.chunks(F::WIDTH) {
@@ -87,21 +72,16 @@ fn sine_near_zero_is_good_relatively() {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
 #[test]
 fn sincos_is_bitwise_the_same_in_every_width() {
     let angles: Vec<f32> = angles(1e6).into_iter().map(|x| x as f32).collect();
     let one = sincos::<f32>(&angles);
-    let same = |wide: Vec<(f32, f32)>| {
-        let bits = |(s, c): (f32, f32)| (s.to_bits(), c.to_bits());
-        wide.into_iter().zip(&one).all(|(a, b)| bits(a) == bits(*b))
-    };
-    if has_eight() {
-        // SAFETY: the processor has the features (checked above)
-        assert!(same(unsafe { wide::sincos_by_eight(&angles) }));
-    }
-    if has_sixteen() {
-        // SAFETY: the processor has the features (checked above)
-        assert!(same(unsafe { wide::sincos_by_sixteen(&angles) }));
+    let bits = |(s, c): (f32, f32)| (s.to_bits(), c.to_bits());
+    for (width, found) in sincos_in_every_width(&angles) {
+        let same = found
+            .into_iter()
+            .zip(&one)
+            .all(|(a, b)| bits(a) == bits(*b));
+        assert!(same, "{width} worlds");
     }
 }

@@ -10,11 +10,11 @@ use sim_model::Model;
 use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
+use sim_physics::lane::simd::{EIGHT, widths};
 
 macro_rules! compiled {
-    ($(#[$attribute:meta])* $name:ident $($features:literal)?) => {
+    ($(#[$attribute:meta])* $name:ident) => {
         $(#[$attribute])*
-        $(#[target_feature(enable = $features)])?
         unsafe fn $name<F: Lane>(chunk: &mut Chunk<F>, job: &Job<F>, substeps: usize, arena: Arena, profile: Option<&mut Profile>) {
             // SAFETY: by contract.
             unsafe { chunk.run(job, substeps, arena, profile) }
@@ -24,36 +24,21 @@ macro_rules! compiled {
 
 compiled!(
     #[cfg(target_arch = "x86_64")]
-    avx512 "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2"
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma,bmi1,bmi2")]
+    avx512
 );
 compiled!(
-    #[cfg(target_arch = "x86_64")]
-    avx2 "avx2,fma,bmi1,bmi2"
-);
-compiled!(
-    #[cfg(not(target_arch = "x86_64"))]
-    portable
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
+    lowest
 );
 
 /// Whether this processor runs blocks of this width.
 pub fn available(lanes: Lanes) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    let (avx2, avx512) = (
-        is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2"),
-        is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl")
-            && is_x86_feature_detected!("avx512bw"),
-    );
-    #[cfg(not(target_arch = "x86_64"))]
-    let (avx2, avx512) = (false, false);
+    let widths = widths();
     match lanes {
-        Lanes::Auto | Lanes::Scalar => avx2 || cfg!(not(target_arch = "x86_64")),
-        Lanes::Eight => avx2,
-        Lanes::Sixteen => avx2 && avx512,
+        Lanes::Auto | Lanes::Scalar => widths.one,
+        Lanes::Eight => widths.eight,
+        Lanes::Sixteen => widths.sixteen,
     }
 }
 
@@ -102,9 +87,9 @@ pub fn create(
             };
             boxed(model, groups, layout, threads, compiled)
         }
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
         (Precision::F32, Lanes::Eight) => {
-            let compiled = baseline("AVX2", stages_f32x8::STAGES);
+            let compiled = baseline(EIGHT, stages_f32x8::STAGES);
             boxed(model, groups, layout, threads, compiled)
         }
         (Precision::F32, _) => {
@@ -114,16 +99,12 @@ pub fn create(
     }
 }
 
-/// A version for the baseline instruction set.
+/// A version for the lowest instruction set that is supported.
 fn baseline<F: Lane>(instructions: &'static str, stages: Stages<F>) -> CompiledStages<F> {
-    #[cfg(target_arch = "x86_64")]
-    let chunk = avx2;
-    #[cfg(not(target_arch = "x86_64"))]
-    let chunk = portable;
     CompiledStages {
         instructions,
         stages,
-        chunk,
+        chunk: lowest,
     }
 }
 

@@ -3,10 +3,9 @@
 //! SAFETY of every intrinsic here: the types are used only below a function that enables their
 //! target features (`backend/cpu/dispatch.rs`), after a check that the processor has them;
 //! everything above is `#[inline(always)]`, so that it inherits the features.
-#![cfg(target_arch = "x86_64")]
 #![allow(clippy::undocumented_unsafe_blocks)] // one proof serves all blocks: the module's documentation
 
-use super::{Lane, Num};
+use crate::lane::{Lane, Num};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
 
