@@ -16,6 +16,7 @@ use crate::hook::Hook;
 use crate::journal::Journal;
 use crate::liveness::Peer;
 use crate::observer::Observer;
+use crate::paths::DaemonPaths;
 use crate::transport;
 use crate::turn::{Held, Turn};
 use crate::{Description, Frame, Op, ProtocolError, Timing};
