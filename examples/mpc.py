@@ -67,9 +67,10 @@ def planner_of(kind: str, problem: Problem, plan: tl.Sim | None, seed: int) -> S
     """Return a planner for a run."""
     if plan is None:
         return Still(problem)
-    if kind == "sampling":
-        return Sampling(problem, plan, seed)
-    return ILQR(problem, plan, seed)
+    if kind == "ilqr":
+        assert isinstance(problem, CartPole), "the problem has no residuals"
+        return ILQR(problem, plan, seed)
+    return Sampling(problem, plan, seed)
 
 
 def main() -> None:
@@ -95,7 +96,7 @@ def main() -> None:
             os.sched_setaffinity(0, {PLANNER_CORE})  # the planner's daemon inherits it
         plan = make(given.planner, problem, stack)
         if given.view:
-            stack.enter_context(plant.view(open=True))
+            plant.view(open=True)
         done = []
         for seed in range(given.seeds):
             planner = planner_of(given.planner, problem, plan, seed)

@@ -11,6 +11,8 @@ from planning.problem import Array, Problem
 class Sampling:
     """Plans by samples, each a world of one rollout.
 
+    Two more plans compete: the last one, and one half-way from it to the rest.
+
     A plan begins with the command that acts while the planner works. Its second command is the next one of the plant.
 
     Args:
@@ -24,7 +26,9 @@ class Sampling:
 
     def __init__(self, problem: Problem, plan: tl.Sim, seed: int) -> None:
         self._problem, self._plan, self._random = problem, plan, np.random.default_rng(seed)
-        self.controls = problem.rest[list(problem.columns)]
+        self._rest = self.controls = problem.rest[list(problem.columns)]
+        # small noise refines a plan, large noise finds another one; world 0 has none, so the last plan competes, too
+        self._scales = np.append(0.0, np.geomspace(0.1, 1.0, plan.worlds - 1))
         self._best = np.tile(self.controls, (problem.horizon, 1))
         # weights of the knots in each frame: straight lines between them
         knots = np.arange(0, problem.horizon + problem.knot, problem.knot)
@@ -36,8 +40,8 @@ class Sampling:
         """Plan from the state at the start of the present frame; then `controls` are those of the next frame."""
         problem, plan = self._problem, self._plan
         noise = self._random.normal(0, problem.noise, (self._lines.shape[1], plan.worlds, len(self.controls)))
-        noise[:, 0] = 0.0  # the last plan competes, too
-        sampled = self._best[:, None] + np.tensordot(self._lines, noise, 1)
+        sampled = self._best[:, None] + np.tensordot(self._lines, self._scales[:, None] * noise, 1)
+        sampled[:, 1] = 0.5 * (self._best + self._rest)
         sampled = np.clip(sampled, problem.low, problem.high)
         sampled[0] = self.controls
         commands = {problem.command: problem.full(sampled)}
