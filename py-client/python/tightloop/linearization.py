@@ -236,8 +236,8 @@ class _Run:
         faulted = np.flatnonzero((frame.status & FAULTED) != 0)
         if not faulted.size:
             return
-        label, column = labels[state[faulted[0]]], row[faulted[0]]
-        if column == 0:
+        label = labels[int(state[faulted[0]])]
+        if row[faulted[0]] == 0:
             cure = "reset it first" if label.startswith("world") else "give another state"
             raise CommandRefused(f"linearize: {label} is faulted, or faults in this frame; {cure}")
         raise CommandRefused(f"linearize: a perturbed state of {label} faults; give a smaller eps")
