@@ -17,12 +17,13 @@ EXAMPLES = REPOSITORY / "examples"
 RUNS = {
     "franka_lesson.py": ("--worlds 4 --precision f64 --out {out}", r"distance from MuJoCo C +\d\.\de-\d\d"),
     "franka_grasp.py": ("--worlds 8 --out {out}", r"\d+ of 8 worlds lifted the cube"),
-    "mpc.py": ("cartpole --planner ilqr --seeds 1", r"1 of 1 seeds succeed"),
+    "mpc.py": ("arm --seeds 1", r"1 of 1 seeds succeed"),
     "newton_ik_lesson.py": ("--worlds 4", r"the hand is [01]\.\d mm off its target in the mean, [0-4]\.\d mm at most"),
     "newton_lesson.py": ("--worlds 4", r"target demo: joint 4 from -2\.\d+ to -1\.\d+ rad"),
     "own_task.py": ("", r"mean reward of random actions: \d"),
     "own_quadruped.py": ("", r"mean reward of random actions: -?\d"),
     "randomized_push.py": ("--worlds 32 --out {out}", r"\d+ of 32 within 1 cm"),
+    "sysid.py": ("", r"0\.\d+ mrad are expected from the noise of 0\.1 mrad"),
 }
 PICTURES = {"franka_lesson.py", "franka_grasp.py", "randomized_push.py"}
 # Those that need torch or onnxruntime, and the test that runs each, by `make test-rl`.
