@@ -26,7 +26,8 @@ from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, make_task
 from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
-from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, check_options, refuse
+from tightloop.env.reset_arguments import autoreset_mode_of, reset_mask
+from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, refuse
 from tightloop.env.simulation import open_simulation
 from tightloop.env.starts import Starts
 from tightloop.env.states import SettableState
@@ -131,7 +132,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         # a task is bound to one environment: two environments would share its arrays
         self.task = copying.deepcopy(make_task(task, options, VectorEnv))
         check_task(self.task)
-        self.autoreset_mode = _mode(autoreset_mode)
+        self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
         controls = controls_of(self.task)
         scene, self.sim = open_simulation(
@@ -224,7 +225,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             ArgumentError: The mask, the seed or an option is not valid, or an observation is NaN.
         """
         self._check_idle("reset")
-        mask = self._mask(options)
+        given = reset_mask(options, self.num_envs, ready=self._ready)
+        mask = self._all if given is None else given
         check_seeds(seed, self.num_envs)
         level = self._starts.chosen(options, mask)
         super().reset(seed=seed if isinstance(seed, int) else None)
@@ -472,27 +474,3 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         if self._ring is None:
             return StepBuffers(self.num_envs, self.evaluation.observed, self.task.dtype)
         return self._ring.next()
-
-    def _mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
-        check_options(options, ("reset_mask", "level"))
-        if not options or "reset_mask" not in options:
-            return self._all
-        mask = options["reset_mask"]
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ArgumentError(
-                f"reset: options, reset_mask: give a NumPy array of bool, shape {(self.num_envs,)}; got {mask!r}"
-            )
-        if not mask.any():
-            raise ArgumentError("reset: options, reset_mask: no environment is to be reset; set at least one to True")
-        if not self._ready and not mask.all():
-            raise ArgumentError(
-                "reset: options, reset_mask: the first reset is of all environments; leave the mask out"
-            )
-        return mask
-
-
-def _mode(mode: AutoresetMode | str) -> AutoresetMode:
-    for known in AutoresetMode:
-        if mode in (known, known.name, known.value):
-            return known
-    raise ArgumentError(f"autoreset_mode is {mode!r}; give NEXT_STEP, SAME_STEP or DISABLED")
