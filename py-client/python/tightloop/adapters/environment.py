@@ -7,12 +7,13 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from tightloop import checks
+from tightloop.adapters.spread import SpreadVectorEnv
 from tightloop.env import Task, VectorEnv
 from tightloop.errors import ArgumentError
 from tightloop.optional_imports import optional_import
 
 #: What an adapter takes: an environment, or a task to make one for.
-Given = VectorEnv | Task | type[Task] | str
+Given = VectorEnv | SpreadVectorEnv | Task | type[Task] | str
 
 
 def library(module: str, *, install: str) -> Any:
@@ -49,7 +50,7 @@ def set_torch_threads(torch: Any, threads: int | None, device: str = "cpu") -> N
         torch.set_num_threads(count)
 
 
-def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode, options: dict[str, Any]) -> VectorEnv:
+def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode, options: dict[str, Any]) -> Any:
     """Return an environment with an autoreset mode: the given one, or a new one of the given task.
 
     Args:
@@ -61,7 +62,7 @@ def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode,
     Raises:
         ArgumentError: The environment has another mode, or arguments for a new one were given too.
     """
-    if not isinstance(given, VectorEnv):
+    if not isinstance(given, VectorEnv | SpreadVectorEnv):
         if "autoreset_mode" in options or "copy" in options:
             raise ArgumentError("autoreset_mode and copy: the adapter chooses them, leave them out")
         # the adapter copies what it returns, so VectorEnv need not

@@ -119,8 +119,10 @@ class RslRlVecEnv(rsl_env.VecEnv):
         done = terminated | truncated
         self._obs = self._observation(obs)
         extras: dict[str, Any] = {"time_outs": self._tensor(truncated & ~terminated)}
-        if done.any() and "success" in infos["final_info"]:
-            extras["log"] = {"/success": float(infos["final_info"]["success"][done].mean())}
+        last = infos.get("final_info", {})
+        # nothing is known of episodes that ended since their machine was lost
+        if "success" in last and (known := last["_success"]).any():
+            extras["log"] = {"/success": float(last["success"][known].mean())}
         return self._obs, self._tensor(reward), self._tensor(done).long(), extras
 
     def close(self) -> None:

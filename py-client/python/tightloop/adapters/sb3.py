@@ -82,10 +82,11 @@ class Sb3VecEnv(vec_env.VecEnv):
         if done.any():
             rows = np.flatnonzero(done)
             last, late = infos["final_obs"][rows], truncated[rows] & ~terminated[rows]
-            success = infos["final_info"].get("success")
+            success, known = (infos["final_info"].get(name) for name in ("success", "_success"))
             for row, world in enumerate(rows.tolist()):
                 news[world] = {"terminal_observation": last[row], "TimeLimit.truncated": bool(late[row])}
-                if success is not None:
+                # nothing is known of episodes that ended since their machine was lost
+                if success is not None and known[world]:
                     news[world]["is_success"] = bool(success[world])
         return obs.copy(), reward.copy(), done, news
 
