@@ -189,6 +189,7 @@ mod tests {
     use crate::plan::Plan;
     use crate::task::{Reach, Task};
     use sim_model::{Description, UrdfOptions};
+    use sim_physics::arrays::Block;
     use std::path::Path;
 
     /// Step of a difference [rad or m].
