@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from clients import program_in_c
+from numpy.typing import NDArray
 from record import REPOSITORY, write_results
 
 import tightloop as tl
@@ -52,9 +53,10 @@ def run(*arguments: str) -> dict[str, float]:
     return json.loads(subprocess.run(arguments, stdout=subprocess.PIPE, check=True, text=True).stdout)
 
 
-def from_python(sim: tl.Sim, seconds: int) -> dict[str, float]:
-    """A turn of a controller in Python that answers at once."""
-    target = np.array(sim.forward().joint_q[0, : len(sim.dof_names)])
+def from_python(sim: tl.Sim, seconds: int, target: NDArray[np.float32] | None = None) -> dict[str, float]:
+    """A turn of a controller in Python that answers at once: with targets of its own, or those that are in an array."""
+    if target is None:
+        target = np.array(sim.forward().joint_q[0, : len(sim.dof_names)])
     frames = round(seconds / PERIOD)
     times = np.empty(frames)
     for _ in range(WARM_UP):

@@ -150,6 +150,28 @@ threads that sleep until shortly before a frame is due, and spin; it computes no
 - The other columns are from when a frame was due until the controller had it.
 """,
     ),
+    "planner": Bench(
+        "A planner beside a loop of 1 kHz",
+        """A Franka arm with frames of 2 substeps. Its daemon and its controller share one core, at real-time
+priority. Predictive sampling with 128 worlds and 25 frames plans all the time on the other core. Both sides take turns.
+
+- A deadline is missed where a frame left more than 0.1 ms after it was due, or where its command was late.
+- Times are from when a frame was due until the controller had it.
+""",
+        {
+            "side": "side",
+            "frames": "frames",
+            "missed_percent": "missed [%]",
+            "late": "late commands",
+            "p50_us": "median [µs]",
+            "p99_us": "99 % [µs]",
+            "p999_us": "99.9 % [µs]",
+            "worst_us": "worst [µs]",
+            "plans_per_s": "plans/s",
+            "more_missed_points": "more missed [points]",
+            "asked_points": "asked [points]",
+        },
+    ),
     "contacts": Bench(
         "Arm with contacts, beside MuJoCo C on one thread",
         """The arm is the published FR3 with its meshes as convex hulls. The demos:
