@@ -56,7 +56,7 @@ def test_blocks_that_do_not_run_say_why():
     assert needs == {
         "needs a Vulkan driver": 1,
         "needs a browser": 1,
-        "needs a checkout": 12,
+        "needs a checkout": 14,
         "needs a compiler": 3,
         "needs a network": 2,
         "needs a notebook": 1,
