@@ -174,8 +174,8 @@ impl Draw {
     pub fn normal(&self, index: u32, mean: f64, std: f64) -> f64 {
         let [a, b] = self.units(index);
         // 1 - a is above 0, and its logarithm finite
-        let radius = (-2.0 * (1.0 - a).ln()).sqrt();
-        mean + std * radius * (std::f64::consts::TAU * b).cos()
+        let radius = (-2.0 * libm::log(1.0 - a)).sqrt();
+        mean + std * radius * libm::cos(std::f64::consts::TAU * b)
     }
 
     /// A number of a distribution.

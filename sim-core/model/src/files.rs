@@ -4,10 +4,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::Read as _;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
-
-use rustix::fs::OFlags;
 
 use crate::error::ModelError;
 
@@ -51,16 +48,31 @@ impl FileError {
 /// # Errors
 /// What the system says; [`FileError::NotAFile`].
 pub fn open(path: &Path) -> Result<File, FileError> {
-    // a pipe without a writer would be waited for, and a terminal would become that of this process
-    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
-    let file = OpenOptions::new()
-        .read(true)
-        .custom_flags(flags.bits() as i32)
-        .open(path)?;
+    let file = to_read().open(path)?;
     match file.metadata()?.is_file() {
         true => Ok(file),
         false => Err(FileError::NotAFile),
     }
+}
+
+/// A pipe without a writer would be waited for, and a terminal would become that of this process.
+#[cfg(unix)]
+fn to_read() -> OpenOptions {
+    use rustix::fs::OFlags;
+    use std::os::unix::fs::OpenOptionsExt as _;
+
+    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
+    let mut options = OpenOptions::new();
+    options.read(true).custom_flags(flags.bits() as i32);
+    options
+}
+
+/// No pipe or terminal has the name of a file.
+#[cfg(not(unix))]
+fn to_read() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    options
 }
 
 /// The bytes of a file of at most `limit` of them.
@@ -83,7 +95,7 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
     Ok(bytes)
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 

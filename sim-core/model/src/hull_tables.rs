@@ -225,7 +225,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..count)
             .map(|k| {
                 let z = 1.0 - (2 * k + 1) as f64 / count as f64;
-                let (sin, cos) = (2.4 * k as f64).sin_cos();
+                let (sin, cos) = libm::sincos(2.4 * k as f64);
                 let radius = (1.0 - z * z).sqrt();
                 [radius * cos, radius * sin, z]
             })

@@ -32,8 +32,8 @@ pub fn principal_moments(tensor: [[f64; 3]; 3]) -> [f64; 3] {
             }
             // tan of the angle that makes a(p,q) vanish, the smaller root of t² + 2 θ t − 1 = 0
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let tan = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let cos = 1.0 / tan.hypot(1.0);
+            let tan = theta.signum() / (theta.abs() + libm::hypot(theta, 1.0));
+            let cos = 1.0 / libm::hypot(tan, 1.0);
             let sin = tan * cos;
             let r = 3 - p - q;
             let (apq, arp, arq) = (a[p][q], a[r][p], a[r][q]);

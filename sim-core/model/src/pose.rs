@@ -37,9 +37,9 @@ impl Pose {
 
     /// URDF's `<origin xyz rpy>`: roll, pitch, yaw [rad] about the parent's fixed x, y, z axes, in that order.
     pub fn from_rpy(pos: [f64; 3], rpy: [f64; 3]) -> Pose {
-        let (sr, cr) = (0.5 * rpy[0]).sin_cos();
-        let (sp, cp) = (0.5 * rpy[1]).sin_cos();
-        let (sy, cy) = (0.5 * rpy[2]).sin_cos();
+        let (sr, cr) = libm::sincos(0.5 * rpy[0]);
+        let (sp, cp) = libm::sincos(0.5 * rpy[1]);
+        let (sy, cy) = libm::sincos(0.5 * rpy[2]);
         // q = q_z(yaw) q_y(pitch) q_x(roll)
         let quat = [
             sr * cp * cy - cr * sp * sy,
@@ -52,7 +52,7 @@ impl Pose {
 
     /// Rotation by `angle` [rad] about the unit vector `axis` through the origin.
     pub fn about(axis: [f64; 3], angle: f64) -> Pose {
-        let (sin, cos) = (0.5 * angle).sin_cos();
+        let (sin, cos) = libm::sincos(0.5 * angle);
         Pose {
             pos: [0.0; 3],
             quat: [sin * axis[0], sin * axis[1], sin * axis[2], cos],

@@ -93,7 +93,7 @@ impl Body {
 
 /// Inertia of a solid ball of water, 2/5 m r². `(3, 3)` [kg·m²]
 fn ball(mass: f64) -> [[f64; 3]; 3] {
-    let radius = (mass / (DENSITY * 4.0 / 3.0 * std::f64::consts::PI)).cbrt();
+    let radius = libm::cbrt(mass / (DENSITY * 4.0 / 3.0 * std::f64::consts::PI));
     let moment = 0.4 * mass * radius * radius;
     [[moment, 0.0, 0.0], [0.0, moment, 0.0], [0.0, 0.0, moment]]
 }

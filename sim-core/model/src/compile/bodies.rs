@@ -419,7 +419,7 @@ fn rotation_vector(quat: &[f64]) -> [f64; 3] {
     let [x, y, z, w] = [quat[0], quat[1], quat[2], quat[3]];
     let sin = (x * x + y * y + z * z).sqrt();
     let scale = if sin > 0.0 {
-        2.0 * sin.atan2(w) / sin
+        2.0 * libm::atan2(sin, w) / sin
     } else {
         0.0
     };

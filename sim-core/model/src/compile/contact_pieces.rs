@@ -194,7 +194,7 @@ pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -
             } => (
                 Kind::Cylinder,
                 [*radius, *half_height, 0.0],
-                radius.hypot(*half_height),
+                libm::hypot(*radius, *half_height),
             ),
             Shape::Mesh(mesh) => {
                 for hull in &mesh.hulls {

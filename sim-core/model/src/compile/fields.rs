@@ -87,7 +87,7 @@ pub(super) fn add_fields(
         let center: [f64; 3] =
             std::array::from_fn(|i| (0..3).map(|k| solid.axes[i][k] * solid.center[k]).sum());
         let base = [center[0] - own.half[0], center[1] - own.half[1], center[2]];
-        let length = dx.hypot(dy);
+        let length = libm::hypot(dx, dy);
         let extent = (0..2).map(|i| base[i].abs() + 2.0 * own.half[i]);
         let mut row = [0.0; field::LEN];
         row[field::BASE..][..3].copy_from_slice(&base);

@@ -1,6 +1,7 @@
 //! Inverse weights at the reference pose q = 0, in f64.
 
 use crate::error::ModelError;
+use faer::fx128;
 use faer::linalg::solvers::DenseSolveCore;
 use sim_physics::constants::{Constants, Motion};
 use sim_physics::math::spatial::{Inertia, Spatial};
@@ -45,10 +46,7 @@ pub(super) fn at_reference(
             joint: names[k].clone(),
         });
     }
-    let factor = mass_matrix
-        .llt(faer::Side::Lower)
-        .map_err(|_| ModelError::SingularMass)?;
-    let inverse = factor.inverse();
+    let inverse = inverse(&mass_matrix)?;
     let link_inverse_weight = constants
         .frames
         .iter()
@@ -82,6 +80,18 @@ pub(super) fn at_reference(
         mean_inertia,
         locked_over_free,
     })
+}
+
+/// The inverse of a symmetric matrix whose lower triangle is given, in twice the digits, then rounded: in `f64`, its last bits
+/// depend on the instructions of the processor.
+fn inverse(matrix: &faer::Mat<f64>) -> Result<faer::Mat<f64>, ModelError> {
+    let singular = |_| ModelError::SingularMass;
+    // with twice the digits, what is singular but for roundings would not be found
+    matrix.llt(faer::Side::Lower).map_err(singular)?;
+    let n = matrix.nrows();
+    let wide = faer::Mat::from_fn(n, n, |i, j| fx128::from(matrix[(i, j)]));
+    let inverse = wide.llt(faer::Side::Lower).map_err(singular)?.inverse();
+    Ok(faer::Mat::from_fn(n, n, |i, j| inverse[(i, j)].0))
 }
 
 /// Inverse weight of a link whose centre is at `center`, moved by the dofs of `path`.

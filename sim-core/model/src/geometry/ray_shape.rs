@@ -46,7 +46,7 @@ impl RayShape {
             RayShape::Sphere(radius) => *radius,
             RayShape::Capsule(radius, half) => radius + half,
             RayShape::Ellipsoid(axes) => axes.iter().copied().fold(0.0, f64::max),
-            RayShape::Cylinder(radius, half) => radius.hypot(*half),
+            RayShape::Cylinder(radius, half) => libm::hypot(*radius, *half),
             RayShape::Box(half) => norm(*half),
             RayShape::Mesh(tree) => return tree.bounds(),
         };

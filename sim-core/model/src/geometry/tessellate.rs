@@ -92,9 +92,9 @@ fn half_circles(radius: f64, half_height: f64) -> Vec<[f64; 2]> {
         let out = if step == 0 || step == 2 * quarter {
             0.0
         } else {
-            radius * angle.cos()
+            radius * libm::cos(angle)
         };
-        [out, radius * angle.sin() + shift]
+        [out, radius * libm::sin(angle) + shift]
     };
     let mut profile: Vec<[f64; 2]> = (0..=quarter).map(|step| at(step, -half_height)).collect();
     let above = if half_height > 0.0 {
@@ -115,7 +115,7 @@ fn revolved(profile: &[[f64; 2]]) -> TriMesh {
         let first = mesh.vertices.len() as u32;
         let ring: Vec<u32> = if radius > 0.0 {
             for step in 0..AROUND {
-                let (sin, cos) = (TAU * step as f64 / AROUND as f64).sin_cos();
+                let (sin, cos) = libm::sincos(TAU * step as f64 / AROUND as f64);
                 mesh.vertices.push([radius * cos, radius * sin, height]);
             }
             (first..first + AROUND as u32).collect()

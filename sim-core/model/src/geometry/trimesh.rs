@@ -184,5 +184,5 @@ fn solid_angle([a, b, c]: [Vector; 3]) -> f64 {
     let (la, lb, lc) = (norm(a), norm(b), norm(c));
     let volume = dot(a, cross(b, c));
     let across = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    2.0 * volume.atan2(across)
+    2.0 * libm::atan2(volume, across)
 }

@@ -184,9 +184,9 @@ pub(super) fn rpy_of_quat([x, y, z, w]: [f64; 4]) -> Option<[f64; 3]> {
         return None;
     }
     let [x, y, z, w] = [x, y, z, w].map(|part| part / largest);
-    let difference = (x - z).atan2(w + y);
-    let sum = (x + z).atan2(w - y);
-    let ratio = (x + z).hypot(w - y).atan2((x - z).hypot(w + y));
+    let difference = libm::atan2(x - z, w + y);
+    let sum = libm::atan2(x + z, w - y);
+    let ratio = libm::atan2(libm::hypot(x + z, w - y), libm::hypot(x - z, w + y));
     let pitch = std::f64::consts::FRAC_PI_2 - 2.0 * ratio;
     Some([sum + difference, pitch, sum - difference])
 }

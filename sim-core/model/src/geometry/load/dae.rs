@@ -240,7 +240,7 @@ fn transform(node: Node) -> Result<Affine, String> {
 
 /// Rodrigues' formula, R = 1 + sin θ K + (1 − cos θ) K² for a unit axis.
 fn rotation([x, y, z]: [f64; 3], angle: f64) -> Affine {
-    let (s, c) = angle.sin_cos();
+    let (s, c) = libm::sincos(angle);
     let t = 1.0 - c;
     Affine::rotation([
         [c + t * x * x, t * x * y - s * z, t * x * z + s * y],
