@@ -33,9 +33,11 @@ CLIPPY         := cargo clippy --release --workspace --all-targets --quiet -- -D
 # Debian packages: a software Vulkan driver with its validation layer, and the browser of the viewer's tests.
 VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
+# An emulator of 64-bit ARM, and a linker for it.
+EMULATOR := qemu-user gcc-aarch64-linux-gnu
 
 .PHONY: demo help test check check-format format docs test-rl train kills soak fuzz published menagerie mujoco-versions packages coverage \
-  newcomer bench bench-env bench-gpu bench-mujoco card wheel dist vulkan browser llvm-cov \
+  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -124,6 +126,15 @@ packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon 
 	cargo install --path sim-daemon --locked --quiet --root out/packages
 	out/packages/bin/tightloop --version
 
+# Not part of `test`: it builds the workspace for ARM, and runs a selection of the tests under qemu. An ARM machine runs
+# `make test` itself.
+CROSS := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc \
+  CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
+test-aarch64: $(VENV)/.dev ## physics, protocol, daemon and Python client for 64-bit ARM, emulated (an hour)
+	$(call debian,$(EMULATOR),an emulator of ARM and its compiler)
+	rustup target add aarch64-unknown-linux-gnu
+	env -u PYO3_PYTHON $(CROSS) tests/aarch64/run.sh $(PYTHON)
+
 # Builds the workspace a second time, with counters, into target/llvm-cov-target.
 coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## what the tests run, into out/coverage
 	$(LLVM_COV) --release --workspace --lib --bins --tests --html --output-dir out/coverage/rust
@@ -181,15 +192,23 @@ $(VENV)/.wheel: $(VENV)/.demo $(RUST_SOURCES) $(PYTHON_SOURCES)
 	$(PIP) install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
-# Without --compatibility maturin picks the lowest manylinux tag that the build machine's libc allows.
-dist: $(VENV)/.demo ## a wheel for other machines, with a manylinux tag, into out/dist
-	$(VENV)/bin/maturin build --release --manifest-path py-client/Cargo.toml --interpreter $(PYTHON) --out out/dist
+# Zig links for the libc of manylinux_2_28, so that the wheels do not depend on this machine's. Each architecture is a build
+# of its own. PYO3_PYTHON belongs to this machine.
+ARCHITECTURES ?= x86_64 aarch64
+wheels: $(VENV)/.wheels ## wheels for other machines, manylinux_2_28 on x86-64 and ARM, audited, into out/dist
+	@rm -rf out/dist
+	rustup target add $(addsuffix -unknown-linux-gnu,$(ARCHITECTURES))
+	for architecture in $(ARCHITECTURES); do \
+	  env -u PYO3_PYTHON PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(VENV)/bin/maturin build --release --zig \
+	    --compatibility manylinux_2_28 --target $$architecture-unknown-linux-gnu --manifest-path py-client/Cargo.toml \
+	    --out out/dist || exit 1; done
+	$(PYTHON) tests/packaging/audit.py out/dist
 
 # Each stamp file says that the packages of one requirements file are installed.
 $(VENV)/.demo: | $(PYTHON)
 $(VENV)/.dev: $(VENV)/.demo
-$(VENV)/.docs $(VENV)/.rl $(VENV)/.peers $(VENV)/.coverage: $(VENV)/.dev
-$(addprefix $(VENV)/.,demo dev docs rl peers coverage): $(VENV)/.%: py-client/requirements-%.txt
+$(VENV)/.docs $(VENV)/.rl $(VENV)/.peers $(VENV)/.coverage $(VENV)/.wheels: $(VENV)/.dev
+$(addprefix $(VENV)/.,demo dev docs rl peers coverage wheels): $(VENV)/.%: py-client/requirements-%.txt
 	$(PIP) install --quiet -r $<
 	@touch $@
 

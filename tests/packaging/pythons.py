@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -89,7 +90,8 @@ def installed(python: Path, wheel: Path, folder: Path) -> dict[str, str]:
 
 def main() -> int:
     """Try all, and say which do not work."""
-    (wheel,) = Path(sys.argv[1]).glob("*.whl")
+    machine = platform.machine()
+    (wheel,) = Path(sys.argv[1]).glob(f"*_{machine}.whl")
     print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB")
     failed = 0
     for python in pythons():
