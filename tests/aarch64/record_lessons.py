@@ -1,6 +1,6 @@
 """Records the lesson's torques, targets and grasp on this machine, for a replay on another processor.
 
-python tests/aarch64/record_lessons.py FOLDER
+    PYTHONPATH=examples python tests/aarch64/record_lessons.py FOLDER
 """
 
 from __future__ import annotations
@@ -10,13 +10,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
-sys.path.insert(0, str(EXAMPLES))
-
 import franka_grasp as grasp
 import franka_lesson as lesson
+import numpy as np
 
 import tightloop as tl
 

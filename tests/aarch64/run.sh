@@ -11,7 +11,8 @@ built=${CARGO_TARGET_DIR:-target}/$target/release
 
 cargo nextest run --release --target $target --workspace --config-file tests/aarch64/nextest.toml \
   -E "$(grep -v '^#' tests/aarch64/selection.txt)" --no-fail-fast
-cargo build --release --target $target --workspace --lib --quiet
+# with the features of the tests, or all is built again
+cargo build --release --target $target --workspace --lib --tests --quiet
 
 [ -x $folder/python ] || tests/aarch64/python.sh $folder "$python"
 rm -rf $folder/site/tightloop
@@ -19,7 +20,7 @@ cp -r py-client/python/tightloop $folder/site/
 cp "$built/lib_core.so" $folder/site/tightloop/_core.abi3.so
 
 # lessons recorded on this machine have the same bits on the other
-"$python" tests/aarch64/record_lessons.py $folder/lessons
+PYTHONPATH=examples "$python" tests/aarch64/record_lessons.py $folder/lessons
 for lesson in $folder/lessons/*.tlrec; do
   PYTHONPATH=$folder/site $folder/python -m tightloop replay "$lesson"
 done
