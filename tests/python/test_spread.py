@@ -205,8 +205,8 @@ def lose(own: Any, fleet: LocalFleet, one: Any, actions: Any) -> tuple[Any, ...]
 def test_a_lost_shard_of_the_mode_same_step_begins_again_and_the_others_go_on(spread: Any, envs: Any) -> None:
     own, fleet, one = pair(spread, envs, "SAME_STEP", 13)
     moves = gentle(own, 60)
-    before = [[env.step(actions) for env in (own, one)][0] for actions in islice(moves, 7)]
-    last = before[-1][0]
+    before = [(own.step(actions), one.step(actions)) for actions in islice(moves, 7)]
+    last = before[-1][0][0]
     obs, truncated, infos = lose(own, fleet, one, next(moves))
     again, first = replaced(envs, own, "SAME_STEP", 13)
     assert truncated[LOST].all()
@@ -227,8 +227,8 @@ def test_a_lost_shard_of_the_mode_same_step_begins_again_and_the_others_go_on(sp
 def test_a_lost_shard_of_the_mode_next_step_begins_again_and_the_others_go_on(spread: Any, envs: Any) -> None:
     own, fleet, one = pair(spread, envs, "NEXT_STEP", 13)
     moves = gentle(own, 60)
-    before = [[env.step(actions) for env in (own, one)][0] for actions in islice(moves, 7)]
-    last, ended = before[-1][0], before[-1][3]
+    before = [(own.step(actions), one.step(actions)) for actions in islice(moves, 7)]
+    last, _, _, ended, _ = before[-1][0]
     assert ended[LOST].tolist() == [False, False, True]
     obs, truncated, _ = lose(own, fleet, one, next(moves))
     again, first = replaced(envs, own, "NEXT_STEP", 13)

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -172,6 +173,10 @@ class _Actors:
 
 class _NodeShard(Shard):
     """A shard that knows its node."""
+
+    def pid(self) -> int:
+        """Return the number of the process."""
+        return os.getpid()
 
     def place(self) -> str:
         return f"node {ray.get_runtime_context().get_node_id()} ({ray.util.get_node_ip_address()})"
