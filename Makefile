@@ -36,7 +36,7 @@ BROWSER := chromium
 # An emulator of 64-bit ARM, and a linker for it.
 EMULATOR := qemu-user gcc-aarch64-linux-gnu
 
-.PHONY: demo help test check check-format format docs test-rl train kills soak fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test check check-format format docs test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -87,6 +87,10 @@ docs: announce-docs wheel $(VENV)/.docs ## the site into out/site: guides, refer
 # Not part of `test`, which needs no torch. With several threads torch spins on busy cores.
 test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libraries, short trainings (installs 6 GB)
 	OMP_NUM_THREADS=1 $(PYTEST) tests/rl
+
+# Not part of `test`, which compares 25 worlds.
+test-ray: wheel $(VENV)/.dev ## a Ray cluster of three nodes with 3072 worlds, beside one daemon, and a killed node
+	TIGHTLOOP_RAY_WORLDS=3072 TIGHTLOOP_RAY_STEPS=1000 $(PYTEST) tests/python/test_ray.py
 
 train: announce-train wheel $(VENV)/.rl ## train a policy, into out/ppo (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1)
 	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
