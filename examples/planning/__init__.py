@@ -1,1 +1,1 @@
-"""Parts of examples/mpc.py and examples/sysid.py: problems, planners, and the identification of parameters."""
+"""Parts of examples/mpc.py: problems and planners."""
