@@ -115,7 +115,8 @@ class Run:
                 last = sim.recv()
                 in_flight = False
         except BaseException as problem:
-            if in_flight:
+            # Ctrl-C can come between the end of `send` and the next line
+            if in_flight or not isinstance(problem, TightloopError):
                 _finish(sim)
             if isinstance(problem, CommandRefused):
                 raise type(problem)(f"rollout: frame {index}: {problem}") from None

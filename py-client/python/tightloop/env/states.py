@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop.command_arrays import ready_arrays
-from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.errors import ArgumentError, CommandRefused, TightloopError
 from tightloop.inputs import reals
 from tightloop.signatures import checked_calls
 
@@ -33,6 +34,7 @@ class SettableState:
     _ready: bool
     _failed: bool
     _in_flight: bool
+    _interrupted: bool
 
     @property
     def level(self) -> NDArray[np.int32]:
@@ -76,9 +78,19 @@ class SettableState:
             why = "the last step or reset failed" if self._failed else "no episode has begun"
             raise CommandRefused(f"{call}: {why}; call reset first")
 
+    def _drop_interrupted(self) -> None:
+        """Receive the step that Ctrl-C left in flight, if there is one: a reset makes its results worthless."""
+        if self._interrupted:
+            # the step may not have been sent; a lost daemon is an error of the reset that follows
+            with suppress(TightloopError):
+                self.sim.recv()
+            self._in_flight = self._interrupted = self._ready = False
+            self._failed = True
+
     def _check_idle(self, call: str) -> None:
         if self._in_flight:
-            raise CommandRefused(f"{call}: a step is on its way; call recv first")
+            cure = "recv or reset" if self._interrupted else "recv"
+            raise CommandRefused(f"{call}: a step is on its way; call {cure} first")
 
 
 def _rows(name: str, values: ArrayLike, worlds: int) -> NDArray[np.float64]:

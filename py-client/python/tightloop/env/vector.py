@@ -175,7 +175,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         # worlds whose results were NaN in this step, and those whose episode began with such an observation
         self._spoiled, self._spoiled_start = np.zeros((2, self.num_envs), np.bool_)
         self._frame: Any = None
-        self._ready = self._failed = self._in_flight = False
+        self._ready = self._failed = self._in_flight = self._interrupted = False
 
     @property
     def elapsed(self) -> NDArray[np.int32]:
@@ -224,6 +224,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         Raises:
             ArgumentError: The mask, the seed or an option is not valid, or an observation is NaN.
         """
+        self._drop_interrupted()
         self._check_idle("reset")
         given = reset_mask(options, self.num_envs, ready=self._ready)
         mask = self._all if given is None else given
@@ -246,8 +247,12 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
 
     def step(self, actions: ArrayLike) -> Step:
         """Advance all worlds by one control step: `send`, then `recv`. Arguments, results and errors are theirs."""
-        self.send(actions)
-        return self.recv()
+        try:
+            self.send(actions)
+            return self.recv()
+        except KeyboardInterrupt:
+            self._interrupted = True
+            raise
 
     def send(self, actions: ArrayLike) -> None:
         """Send the actions of a step, and return at once; `recv` waits for the results.
@@ -267,8 +272,16 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             raise CommandRefused(f'{problem}; call reset(options={{"reset_mask": …}}) for those that ended')
         commands = self._actions.take(actions, self._frame)
         self._disturbances.apply(self._episodes.seeds, self._episodes.numbers)
-        self.sim.send(**commands, **self._disturbances.commands)
+        # before the call: Ctrl-C can come between its end and the next line
         self._in_flight = True
+        try:
+            self.sim.send(**commands, **self._disturbances.commands)
+        except KeyboardInterrupt:
+            self._interrupted = True
+            raise
+        except BaseException:
+            self._in_flight = False
+            raise
 
     def recv(self) -> Step:
         """Wait for the results of the actions that `send` sent.
@@ -289,7 +302,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             with advice.explained_by(self._actions.not_finite):
                 frame = self.sim.recv()
         except KeyboardInterrupt:
-            raise  # `recv` may be called again
+            self._interrupted = True  # `recv` may be called again, or `reset`
+            raise
         except DaemonLost:  # no reset helps, and the next call says so again
             self._in_flight = False
             raise
@@ -297,7 +311,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             self._in_flight = self._ready = False
             self._failed = True
             raise
-        self._in_flight = False
+        self._in_flight = self._interrupted = False
         with self._all_or_none():
             return self._results(frame)
 
