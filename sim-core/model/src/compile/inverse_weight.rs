@@ -1,8 +1,6 @@
 //! Inverse weights at the reference pose q = 0, in f64.
 
 use crate::error::ModelError;
-use faer::fx128;
-use faer::linalg::solvers::DenseSolveCore;
 use sim_physics::constants::{Constants, Motion};
 use sim_physics::math::spatial::{Inertia, Spatial};
 use sim_physics::math::vec3::{Mat3, Vec3};
@@ -82,16 +80,39 @@ pub(super) fn at_reference(
     })
 }
 
-/// The inverse of a symmetric matrix whose lower triangle is given, in twice the digits, then rounded: in `f64`, its last bits
-/// depend on the instructions of the processor.
+/// The inverse of a symmetric matrix whose lower triangle is given, by its Cholesky factor L: L⁻ᵀ L⁻¹.
+///
+/// Sums run in index order. faer tells whether there is an inverse; the last bits of its own depend on the vector instructions
+/// of the processor.
 fn inverse(matrix: &faer::Mat<f64>) -> Result<faer::Mat<f64>, ModelError> {
-    let singular = |_| ModelError::SingularMass;
-    // with twice the digits, what is singular but for roundings would not be found
-    matrix.llt(faer::Side::Lower).map_err(singular)?;
+    let singular = || ModelError::SingularMass;
+    matrix.llt(faer::Side::Lower).map_err(|_| singular())?;
     let n = matrix.nrows();
-    let wide = faer::Mat::from_fn(n, n, |i, j| fx128::from(matrix[(i, j)]));
-    let inverse = wide.llt(faer::Side::Lower).map_err(singular)?.inverse();
-    Ok(faer::Mat::from_fn(n, n, |i, j| inverse[(i, j)].0))
+    let mut factor = faer::Mat::<f64>::zeros(n, n);
+    let mut half = faer::Mat::<f64>::zeros(n, n);
+    for i in 0..n {
+        for j in 0..i {
+            let left = (0..j).fold(matrix[(i, j)], |sum, k| {
+                sum - factor[(i, k)] * factor[(j, k)]
+            });
+            factor[(i, j)] = left / factor[(j, j)];
+        }
+        let square = (0..i).fold(matrix[(i, i)], |sum, k| {
+            sum - factor[(i, k)] * factor[(i, k)]
+        });
+        if square.is_nan() || square <= 0.0 {
+            return Err(singular());
+        }
+        factor[(i, i)] = square.sqrt();
+        for j in 0..i {
+            let left = (j..i).fold(0.0, |sum, k| sum - factor[(i, k)] * half[(k, j)]);
+            half[(i, j)] = left / factor[(i, i)];
+        }
+        half[(i, i)] = 1.0 / factor[(i, i)];
+    }
+    Ok(faer::Mat::from_fn(n, n, |i, j| {
+        (i.max(j)..n).fold(0.0, |sum, k| sum + half[(k, i)] * half[(k, j)])
+    }))
 }
 
 /// Inverse weight of a link whose centre is at `center`, moved by the dofs of `path`.
@@ -184,4 +205,32 @@ fn path(constants: &Constants<f64>, body: usize) -> Vec<usize> {
         next = constants.bodies[b].parent;
     }
     dofs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faer::linalg::solvers::DenseSolveCore as _;
+
+    #[test]
+    fn the_inverse_is_that_of_faer_to_roundings() {
+        let n = 40;
+        // diagonally dominant, so its condition is below n
+        let matrix = faer::Mat::from_fn(n, n, |i, j| match i == j {
+            true => n as f64,
+            false => libm::sin((i * j + i.min(j)) as f64),
+        });
+        let ours = inverse(&matrix).unwrap();
+        let theirs = matrix.llt(faer::Side::Lower).unwrap().inverse();
+        let largest = (&ours - &theirs).norm_max();
+        // n sums of n roundings each, times the condition, of entries of 1/n
+        let tolerance = (n * n) as f64 * f64::EPSILON;
+        assert!(largest > 0.0 && largest < tolerance, "{largest:e}");
+    }
+
+    #[test]
+    fn a_matrix_without_an_inverse_is_refused() {
+        let matrix = faer::Mat::from_fn(3, 3, |_, _| 1.0);
+        assert!(matches!(inverse(&matrix), Err(ModelError::SingularMass)));
+    }
 }
