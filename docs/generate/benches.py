@@ -445,12 +445,26 @@ machines were busy.
     ),
     "newcomer": Bench(
         "From a clean checkout to the first picture",
-        """`make demo` with empty caches, and again in the same checkout. Rust and Python were installed before.
+        """`cold` is `git clone` and `make demo` with empty caches, and `warm` is `make demo` again in the same checkout.
+`wheel` installs the built wheel into a new environment, and runs its demo. Rust and Python were installed before.
 """,
         {
             "caches": "caches",
             "first_picture_s": "first picture [s]",
             "whole_demo_s": "whole demo [s]",
+            "asked_s": "asked [s]",
+        },
+    ),
+    "newcomer_start": Bench(
+        "Import and first step",
+        """The time of `import tightloop`, and from the start of Python to the first step of 4096 arms. Each sample is
+a process of its own.
+""",
+        {
+            "what": "what",
+            "median_s": "median [s]",
+            "least_s": "least [s]",
+            "most_s": "most [s]",
             "asked_s": "asked [s]",
         },
     ),
