@@ -33,7 +33,7 @@ import tightloop as tl
 from tightloop.adapters.ray import RayVectorEnv
 
 WORLDS = int(os.environ.get("TIGHTLOOP_RAY_WORLDS", "25"))
-STEPS = int(os.environ.get("TIGHTLOOP_RAY_STEPS", "370"))  # an episode of FrankaReach has 360
+STEPS = int(os.environ.get("TIGHTLOOP_RAY_STEPS", "390"))  # an episode of FrankaReach has 360, and some begin at 20
 #: Memory of a node's object store, the least that Ray takes without a warning [bytes].
 STORE = 80 * 1024**2
 

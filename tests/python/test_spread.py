@@ -323,6 +323,20 @@ def test_a_shard_that_cannot_start_is_an_error_with_a_cure_and_a_reset_tries_aga
     own.step(actions)
 
 
+def test_a_node_that_refuses_the_environment_is_an_error_and_a_reset_tries_again(
+    spread: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, fleet = spread("CartPoleBalance")
+    own.reset(seed=0)
+    fleet.stop(1)
+    with monkeypatch.context() as patched:
+        patched.setattr(Shard, "open", lambda *_: tl.ResourceError("no shared memory; make room"))
+        with pytest.raises(tl.ResourceError, match=r"no shared memory; make room .of worlds 4 to 6"):
+            own.step(np.zeros((WORLDS, 1)))
+    own.reset(seed=0)
+    assert "restarted" not in own.step(np.zeros((WORLDS, 1)))[4]
+
+
 class Broken(CartPoleBalance):
     """A task whose reward is no number in steep worlds."""
 

@@ -26,6 +26,8 @@ from stable_baselines3 import PPO
 from tightloop.adapters.ray import RayVectorEnv
 from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
 from tightloop.adapters.sb3 import Sb3VecEnv
+from tightloop.adapters.skrl import SkrlEnv
+from tightloop.adapters.torchrl import TorchRlEnv
 from tightloop.env import VectorEnv
 
 WORLDS = 8
@@ -34,7 +36,9 @@ WORLDS = 8
 @pytest.fixture(scope="module", autouse=True)
 def cluster() -> Iterator[None]:
     """Ray on this machine."""
-    ray.init(num_cpus=4, include_dashboard=False, log_to_driver=False, object_store_memory=80 * 1024**2)
+    ray.init(
+        address="local", num_cpus=4, include_dashboard=False, log_to_driver=False, object_store_memory=80 * 1024**2
+    )
     yield
     ray.shutdown()
 
@@ -78,6 +82,17 @@ def test_rsl_rl_learns_the_same_weights(both: Any, tmp_path: Any) -> None:
         runner.learn(3, init_at_random_ep_len=True)
         weights.append([value.numpy().copy() for value in runner.alg.actor.state_dict().values()])
     assert all(np.array_equal(ours, theirs) for ours, theirs in zip(*weights, strict=True))
+
+
+def test_skrl_and_torchrl_step_it(made: Callable[[Any], Any]) -> None:
+    ours = made(SkrlEnv(RayVectorEnv("CartPoleBalance", WORLDS, actors=2)))
+    ours.reset()
+    obs, reward, *_ = ours.step(torch.zeros(WORLDS, 1))
+    assert obs.shape == (WORLDS, 5) and (reward == 1.0).all()
+    options: dict[str, Any] = {"autoreset_mode": "DISABLED", "max_episode_steps": 5}
+    theirs = made(TorchRlEnv(RayVectorEnv("CartPoleBalance", WORLDS, actors=2, **options)))
+    rollout = theirs.rollout(12, break_when_any_done=False)
+    assert rollout["next", "truncated"].sum(1).eq(2).all()
 
 
 def test_an_iteration_of_rllib_on_two_actors() -> None:

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from gymnasium.vector import AutoresetMode
 
 from tightloop import checks
 from tightloop.adapters.environment import library
+from tightloop.adapters.gathering import ranges
 from tightloop.adapters.shard import Shard
 from tightloop.adapters.shards import Lost
 from tightloop.adapters.spread import SpreadVectorEnv
@@ -30,6 +32,9 @@ ray = library("ray", install="ray")
 
 #: Time that daemons have to end when an environment is closed; then their actors are killed [s].
 _CLOSE_SECONDS = 10.0
+#: Size of the pieces in which calls and results cross. Ray sends what is below 100 KiB inside its messages; through the
+#: object stores of two nodes, 434 KB took 4.7 ms instead of 1.1 ms [bytes].
+_PIECE_BYTES = 64_000
 #: Arguments of `VectorEnv` that shards of a cluster cannot have.
 _REFUSED = {
     "daemon": "each actor launches a daemon of its own",
@@ -139,21 +144,42 @@ class _Actors:
         # a call is never repeated: its worlds have moved on, or are lost
         self._kind = ray.remote(_NodeShard).options(**options, max_restarts=0, max_task_retries=0)
         self._actors: list[Any] = [None] * count
-        self._places = ["no node"] * count
+        self._largest = [0] * count  # answer of each shard [bytes]
 
     def start(self, shard: int) -> None:
         self.stop(shard)
         self._actors[shard] = self._kind.remote()
 
     def call(self, shard: int, method: str, *arguments: Any) -> Any:
-        actor = self._actors[shard]
-        return Lost("it did not start") if actor is None else getattr(actor, method).remote(*arguments)
+        actor, sent = self._actors[shard], ray.cloudpickle.dumps(arguments)
+        if actor is None:
+            return Lost("it did not start")
+        # as many pieces as the largest answer so far needs; a larger one has larger pieces, which is slower
+        count = _pieces_of(self._largest[shard])
+        parts = actor.call.options(num_returns=count).remote(method, count, *_cut(sent, _pieces_of(len(sent))))
+        return shard, [parts] if count == 1 else parts
 
     def answers(self, calls: Sequence[Any], timeout: float) -> list[Any]:
-        refs = [call for call in calls if not isinstance(call, Lost)]
-        ready = set(ray.wait(refs, num_returns=len(refs), timeout=timeout)[0]) if refs else set()
+        parts = [part for call in calls if not isinstance(call, Lost) for part in call[1]]
+        ready = set(ray.wait(parts, num_returns=len(parts), timeout=timeout)[0]) if parts else set()
         late = Lost(f"it did not answer within {timeout:.3g} s")
-        return [call if isinstance(call, Lost) else _answer(call) if call in ready else late for call in calls]
+        return [
+            call if isinstance(call, Lost) else self._answer(*call) if ready.issuperset(call[1]) else late
+            for call in calls
+        ]
+
+    def _answer(self, shard: int, parts: Sequence[Any]) -> Any:
+        """Return the result of a call, or `Lost`; an error of the task's own code is raised."""
+        try:
+            answer = b"".join(ray.get(parts))
+        except ray.exceptions.RayTaskError:
+            raise
+        except (ray.exceptions.LocalRayletDiedError, ray.exceptions.RuntimeEnvSetupError):
+            raise  # the node of this process, or options that no actor can start with
+        except ray.exceptions.RayError as problem:
+            return Lost(f"{type(problem).__name__}: {str(problem).splitlines()[0]}")
+        self._largest[shard] = max(self._largest[shard], len(answer))
+        return pickle.loads(answer)
 
     def stop(self, shard: int) -> None:
         actor, self._actors[shard] = self._actors[shard], None
@@ -172,7 +198,12 @@ class _Actors:
 
 
 class _NodeShard(Shard):
-    """A shard that knows its node."""
+    """A shard that knows its node, and whose calls cross in pieces."""
+
+    def call(self, method: str, count: int, *pieces: bytes) -> bytes | list[bytes]:
+        """Call a method with pickled arguments in pieces; returns its pickled result in ``count`` pieces."""
+        answer = pickle.dumps(getattr(self, method)(*pickle.loads(b"".join(pieces))), protocol=pickle.HIGHEST_PROTOCOL)
+        return answer if count == 1 else _cut(answer, count)
 
     def pid(self) -> int:
         """Return the number of the process."""
@@ -182,16 +213,14 @@ class _NodeShard(Shard):
         return f"node {ray.get_runtime_context().get_node_id()} ({ray.util.get_node_ip_address()})"
 
 
-def _answer(ref: Any) -> Any:
-    """Return the result of a call, or `Lost`; an error of the task's own code is raised."""
-    try:
-        return ray.get(ref)
-    except ray.exceptions.RayTaskError:
-        raise
-    except (ray.exceptions.LocalRayletDiedError, ray.exceptions.RuntimeEnvSetupError):
-        raise  # the node of this process, or options that no actor can start with
-    except ray.exceptions.RayError as problem:
-        return Lost(f"{type(problem).__name__}: {str(problem).splitlines()[0]}")
+def _pieces_of(size: int) -> int:
+    """Return the number of pieces in which bytes are sent."""
+    return max(1, -(-size // _PIECE_BYTES))
+
+
+def _cut(data: bytes, count: int) -> list[bytes]:
+    """Return bytes in pieces of about the same size."""
+    return [data[rows] for rows in ranges(len(data), count)]
 
 
 def _actor_options(given: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -104,14 +104,13 @@ class Shards:
         while True:
             for shard in waiting:
                 self._fleet.start(shard)
-            counts = {shard: self.rows[shard].stop - self.rows[shard].start for shard in waiting}
-            opens = {shard: ("open", self._task, count, self._options) for shard, count in counts.items()}
-            started, lost = self.ask(opens, deadline - time.monotonic())
-            self.infos |= started
-            self._check_alike(started)
-            if begin is not None:
-                started, lost_later = self.ask({shard: begin(shard) for shard in started}, deadline - time.monotonic())
-                lost |= lost_later
+            try:
+                started, lost = self._open(waiting, begin, deadline)
+            except BaseException:
+                # without an environment they could answer no call
+                for shard in waiting:
+                    self._fleet.stop(shard)
+                raise
             results |= started
             if not lost:
                 return results
@@ -125,6 +124,20 @@ class Shards:
                 )
             waiting = lost
             time.sleep(_RETRY_SECONDS)
+
+    def _open(
+        self, shards: Mapping[int, str], begin: Callable[[int], tuple[Any, ...]] | None, deadline: float
+    ) -> tuple[dict[int, Any], dict[int, str]]:
+        """Make the environments of shards that were started, and call a method of each, as `launch` does."""
+        counts = {shard: self.rows[shard].stop - self.rows[shard].start for shard in shards}
+        opens = {shard: ("open", self._task, count, self._options) for shard, count in counts.items()}
+        started, lost = self.ask(opens, deadline - time.monotonic())
+        self.infos |= started
+        self._check_alike(started)
+        if begin is not None:
+            started, lost_later = self.ask({shard: begin(shard) for shard in started}, deadline - time.monotonic())
+            lost |= lost_later
+        return started, lost
 
     def send(self, calls: Mapping[int, tuple[Any, ...]]) -> dict[int, Any]:
         """Call a method of each shard in ``calls``, and return what `receive` takes."""
