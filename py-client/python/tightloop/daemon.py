@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -16,6 +17,12 @@ from tightloop.errors import LaunchError
 _PROGRAM = Path(__file__).with_name("__main__.py")
 # A daemon stops within milliseconds; after this time it is killed [s].
 _STOP_SECONDS = 3.0
+# What to do where the system starts no process, by the error number.
+_CURES = {
+    errno.EAGAIN: "allow this user more processes (`ulimit -u`)",
+    errno.EMFILE: "allow this process more open files (`ulimit -n`)",
+    errno.ENOMEM: "free memory",
+}
 
 
 class Daemon:
@@ -41,14 +48,21 @@ class Daemon:
         if not sys.executable:
             raise LaunchError("this Python does not know its own executable; start `tightloop serve` and attach")
         flags = [f"--{flag}" if value is True else f"--{flag}={value}" for flag, value in arguments.items()]
-        process = subprocess.Popen(
-            # without site packages and environment variables: the daemon needs only this package, and starts faster
-            [sys.executable, "-I", "-S", str(_PROGRAM), "serve", "-", f"--parent={os.getpid()}", *flags],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            # Ctrl-C in a terminal goes to the caller, which decides whether the daemon stops
-            start_new_session=True,
-        )
+        try:
+            process = subprocess.Popen(
+                # without site packages and environment variables: the daemon needs only this package, and starts faster
+                [sys.executable, "-I", "-S", str(_PROGRAM), "serve", "-", f"--parent={os.getpid()}", *flags],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                # Ctrl-C in a terminal goes to the caller, which decides whether the daemon stops
+                start_new_session=True,
+            )
+        except OSError as error:
+            cure = _CURES.get(error.errno or 0, "let this user run that file")
+            raise LaunchError(
+                f"the daemon's process {sys.executable!r} cannot be started: {error.strerror}; {cure}, or start "
+                "`tightloop serve` elsewhere and attach"
+            ) from error
         daemon = cls(process, arguments["name"], users)
         try:
             daemon._await_ready(scene)

@@ -32,7 +32,7 @@ _CHECKSUM, _COVERED, _COUNTERS = 12, 16, 28
 # largest file that is read: a million worlds of the largest robots have less
 _BYTES_MAX = 1 << 36
 _SHARED_MEMORY = Path("/dev/shm")
-_NO_ROOM = "snapshot: no room on its way to the daemon: {}"
+_NO_ROOM = "snapshot: no room on its way to the daemon: {}; make room in shared memory (`df -h /dev/shm` shows it)"
 
 
 @checked_calls
@@ -194,7 +194,15 @@ def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
                 rest = rest[file.write(rest) :]
         except OSError as problem:
             raise SnapshotError(_NO_ROOM.format(problem)) from None
-        yield f"/proc/{os.getpid()}/fd/{file.fileno()}" if nameless else str(file.name)
+        path = f"/proc/{os.getpid()}/fd/{file.fileno()}" if nameless else str(file.name)
+        try:
+            yield path
+        except SnapshotError as problem:
+            # the daemon names the file, which tells a user nothing
+            _, found, reason = str(problem).partition(f"{path}: cannot be written: ")
+            if not found:
+                raise
+            raise SnapshotError(_NO_ROOM.format(reason)) from None
 
 
 def _is_beside(process: int) -> bool:

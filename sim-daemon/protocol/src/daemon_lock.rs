@@ -63,7 +63,7 @@ impl DaemonLock {
     /// Takes the lock if nobody has it.
     fn try_take(paths: &DaemonPaths) -> Result<Option<DaemonLock>, ProtocolError> {
         let path = paths.lock_path();
-        let root_error = |error: std::io::Error| root_error(&path, &error);
+        let root_error = |error: std::io::Error| ProtocolError::root(&path, &error);
         let opened = private().create(true).truncate(false).open(&path);
         let file = match opened {
             // the last daemon there took the folder with it
@@ -117,7 +117,7 @@ impl DaemonLock {
     fn say(&mut self, line: &str) -> Result<(), ProtocolError> {
         self.file
             .write_all_at(line.as_bytes(), 0)
-            .map_err(|error| root_error(&self.paths.lock_path(), &error))
+            .map_err(|error| ProtocolError::root(&self.paths.lock_path(), &error))
     }
 
     /// Where this is.
@@ -136,13 +136,6 @@ impl Drop for DaemonLock {
         if root.starts_with(SHARED_MEMORY) && root == default_root() {
             let _ = fs::remove_dir(root);
         }
-    }
-}
-
-fn root_error(path: &Path, error: &std::io::Error) -> ProtocolError {
-    ProtocolError::Root {
-        path: path.to_owned(),
-        problem: error.to_string(),
     }
 }
 
@@ -184,7 +177,7 @@ fn mark(paths: &DaemonPaths) -> Result<File, ProtocolError> {
         fs::rename(&new, &path)?;
         Ok(file)
     };
-    write().map_err(|error| root_error(&path, &error))
+    write().map_err(|error| ProtocolError::root(&path, &error))
 }
 
 /// Removes what a dead daemon left, its groups included. Returns whether there is nothing left, that is, false while one runs.

@@ -1,11 +1,11 @@
 //! What can go wrong between a client and a daemon, with the culprit and the cure.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
-use crate::problem::{Problem, other_problem, take_problem};
+use crate::problem::{FREE_MIN, Problem, folder_cure, free_bytes, other_problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]
@@ -21,9 +21,7 @@ pub enum ProtocolError {
     },
 
     /// The folder that holds the lock files cannot be used.
-    #[error(
-        "folder {path:?} cannot be used: {problem}; set TIGHTLOOP_ROOT to a folder of your own"
-    )]
+    #[error("folder {path:?} cannot be used: {problem}; {}", folder_cure(path))]
     Root {
         /// The folder.
         path: PathBuf,
@@ -350,6 +348,11 @@ impl ProtocolError {
             Some(Problem::System(Errno::MFILE | Errno::NFILE)) => {
                 ProtocolError::descriptors(action)
             }
+            // the transport names processes and files by /proc
+            _ if !Path::new("/proc/self").exists() => ProtocolError::Transport {
+                action,
+                problem: "/proc is missing; mount it (`mount -t proc proc /proc`)".to_owned(),
+            },
             Some(Problem::System(errno)) => ProtocolError::Transport {
                 action,
                 problem: format!("{problem:?}, {errno}"),
@@ -358,6 +361,30 @@ impl ProtocolError {
                 action,
                 problem: format!("{problem:?}"),
             },
+        }
+    }
+
+    /// A file or folder of the root that the system refuses.
+    pub(crate) fn root(path: &Path, error: &std::io::Error) -> Self {
+        let action = format!("use {}", path.display());
+        match Errno::from_io_error(error) {
+            Some(Errno::NOSPC) => ProtocolError::no_file_fits(path, action),
+            Some(Errno::MFILE | Errno::NFILE) => ProtocolError::descriptors(action),
+            _ => ProtocolError::Root {
+                path: path.to_owned(),
+                problem: error.to_string(),
+            },
+        }
+    }
+
+    fn no_file_fits(path: &Path, what: String) -> Self {
+        let folder = path.parent().unwrap_or(path).to_string_lossy();
+        let (free, needed) = (free_bytes(&folder), FREE_MIN);
+        ProtocolError::SharedMemory {
+            path: folder.into_owned(),
+            free,
+            needed,
+            what,
         }
     }
 

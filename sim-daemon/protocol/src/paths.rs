@@ -19,7 +19,6 @@ use std::sync::OnceLock;
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
 use rustix::fs::OFlags;
-use rustix::io::Errno;
 
 use crate::ProtocolError;
 use crate::hash::Fnv;
@@ -220,13 +219,7 @@ impl DaemonPaths {
     }
 
     fn lock_error(&self, error: &std::io::Error) -> ProtocolError {
-        let (path, problem) = (self.lock_path(), error.to_string());
-        match Errno::from_io_error(error) {
-            Some(Errno::MFILE | Errno::NFILE) => {
-                ProtocolError::descriptors(format!("read {}", path.display()))
-            }
-            _ => ProtocolError::Root { path, problem },
-        }
+        ProtocolError::root(&self.lock_path(), error)
     }
 
     /// The transport's settings for one session, explicit in full: its default would read a file from the working folder.
@@ -273,12 +266,7 @@ pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<DaemonPaths>, P
         Ok(entries) => entries,
         // the last daemon took the folder with it
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => {
-            return Err(ProtocolError::Root {
-                path: root.clone(),
-                problem: error.to_string(),
-            });
-        }
+        Err(error) => return Err(ProtocolError::root(&root, &error)),
     };
     let mut places: Vec<DaemonPaths> = entries
         .flatten()
@@ -353,7 +341,7 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
             {
                 tries += 1;
             }
-            Err(cause) => return Err(error(cause.to_string())),
+            Err(cause) => return Err(ProtocolError::root(path, &cause)),
         }
     };
     if metadata.is_symlink() {

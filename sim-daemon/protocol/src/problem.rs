@@ -2,14 +2,15 @@
 
 use std::cell::RefCell;
 use std::fs::File;
+use std::path::Path;
 
-use rustix::fs::statvfs;
+use rustix::fs::{Access, access, statvfs};
 use rustix::io::Errno;
 
 /// Where POSIX shared memory is on Linux.
 pub const SHARED_MEMORY: &str = "/dev/shm";
 /// With less than this left, what the transport writes beside its memory does not fit either [bytes].
-const FREE_MIN: u64 = 64 << 10;
+pub(crate) const FREE_MIN: u64 = 64 << 10;
 
 /// Why the last call of this thread failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,9 +56,25 @@ pub(crate) fn no_room(needed: u64) -> Option<Problem> {
     matches!(problem, Problem::Full { free, .. } if free < needed).then_some(problem)
 }
 
+/// What to do about a folder that cannot be used. Frames go through [`SHARED_MEMORY`] wherever the root folder is.
+pub(crate) fn folder_cure(folder: &Path) -> &'static str {
+    let writable = access(SHARED_MEMORY, Access::WRITE_OK | Access::EXEC_OK).is_ok();
+    if folder.starts_with(SHARED_MEMORY) && !writable {
+        "frames go through /dev/shm, which must be writable for this user: mount memory there, by \
+         `mount -t tmpfs -o mode=1777 tmpfs /dev/shm`"
+    } else {
+        "set TIGHTLOOP_ROOT to a folder of your own"
+    }
+}
+
 /// Notes why a call fails.
 pub(crate) fn failed(problem: Problem) {
     PROBLEM.replace(Some(problem));
+}
+
+/// Bytes free on the file system of a folder; 0 where that cannot be asked.
+pub(crate) fn free_bytes(folder: &str) -> u64 {
+    statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize)
 }
 
 impl Problem {
@@ -65,7 +82,7 @@ impl Problem {
     pub(crate) fn full(folder: &str, needed: u64) -> Problem {
         Problem::Full {
             folder: folder.to_owned(),
-            free: statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize),
+            free: free_bytes(folder),
             needed,
         }
     }
