@@ -445,8 +445,8 @@ machines were busy.
     ),
     "newcomer": Bench(
         "From a clean checkout to the first picture",
-        """`cold` is `git clone` and `make demo` with empty caches, and `warm` is `make demo` again in the same checkout.
-`wheel` installs the built wheel into a new environment, and runs its demo. Rust and Python were installed before.
+        """`cold` is `git clone` and `make demo` with empty caches, and `warm` is `make demo` again in the same
+checkout. `wheel` installs the built wheel into a new environment, and runs its demo. Rust and Python were there before.
 """,
         {
             "caches": "caches",
