@@ -146,8 +146,9 @@ coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## w
 	COVERAGE_FILE=out/coverage/python.data $(PYTEST) -n 2 --dist loadfile \
 	  --cov=tightloop --cov-report=html:out/coverage/python py-client/tests tests/python
 
-newcomer: ## time `make demo` on a clean checkout with empty caches, and again
+newcomer: wheel ## time a clean checkout with empty caches, a built one, a wheel, and the first step
 	python3 benches/newcomer.py
+	$(PYTHON) benches/newcomer_start.py
 
 bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is compared with
 	cargo bench --package tightloop --bench step

@@ -34,7 +34,7 @@ for device in null zero urandom; do
   touch "$root/dev/$device"; mount --bind /dev/$device "$root/dev/$device"
 done
 if [ "$shm" != none ]; then mkdir "$root/dev/shm"; mount -t tmpfs -o "$shm" tmpfs "$root/dev/shm"; fi
-mount -o remount,ro,mode=755 "$root"
+mount -o remount,bind,ro "$root"
 cd "$root"
 exec chroot . "$@"
 """
