@@ -12,8 +12,9 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from generate.benches import BENCHES, INTRODUCTION, SUMMARY, Bench
+from generate.benches import BENCHES, Bench
 from generate.rust import REPOSITORY
+from generate.summary import INTRODUCTION, SUMMARY
 from generate.tables import table
 
 RESULTS = REPOSITORY / "benches/results"
