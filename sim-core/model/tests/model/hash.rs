@@ -8,9 +8,9 @@ use std::path::Path;
 use sim_model::{Body, Collision, Description, Pose, Robot, Shape, UrdfOptions};
 
 /// Hash of [`lesson`], as its recordings have it.
-const LESSON: u64 = 5651157969518889819;
+const LESSON: u64 = 17994171291502531716;
 /// Hash of [`table_with_cubes`].
-const CONTACTS: u64 = 3620258353031134935;
+const CONTACTS: u64 = 2695925202409377078;
 
 /// The scene of `examples/lesson`, demo `Target`: an FR3 with drives and without contacts.
 fn lesson() -> Description {
