@@ -37,7 +37,7 @@ BROWSER := chromium
 EMULATOR := qemu-user gcc-aarch64-linux-gnu
 
 .PHONY: demo help test check check-format format docs test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
-  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 vulkan browser llvm-cov \
+  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -138,6 +138,10 @@ test-aarch64: $(VENV)/.dev ## physics, protocol, daemon and Python client for 64
 	$(call debian,$(EMULATOR),an emulator of ARM and its compiler)
 	rustup target add aarch64-unknown-linux-gnu
 	env -u PYO3_PYTHON $(CROSS) tests/aarch64/run.sh $(PYTHON)
+
+# For systems where daemons do not run, such as macOS.
+test-portable: ## physics, models and inverse kinematics alone
+	cargo test --release -p sim-physics -p sim-record -p sim-model -p sim-ik
 
 # Builds the workspace a second time, with counters, into target/llvm-cov-target.
 coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## what the tests run, into out/coverage

@@ -66,12 +66,14 @@ fn checked(width: Width) -> Result<Width, IkError> {
 /// # Errors
 /// [`IkError::Lanes`]
 pub fn single(width: Width) -> Result<Work<f32>, IkError> {
-    // SAFETY of all: `checked` has found the instructions
     Ok(match checked(width)? {
         #[cfg(target_arch = "x86_64")]
+        // SAFETY: `checked` has found the instructions
         Width::Sixteen => |job, range, q, s| unsafe { avx512::<F32x16>(job, range, q, s) },
         #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+        // SAFETY: as above
         Width::Eight => |job, range, q, s| unsafe { baseline::<F32x8>(job, range, q, s) },
+        // SAFETY: as above
         _ => |job, range, q, s| unsafe { baseline::<f32>(job, range, q, s) },
     })
 }

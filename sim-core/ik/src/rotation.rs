@@ -80,7 +80,18 @@ mod tests {
         let axes = [[0.6, -0.64, 0.48], [1.0, 0.0, 0.0], [0.0, -0.8, 0.6]];
         let from = quat::matrix(quat::exp(Vec3([0.3, -1.2, 0.7])));
         for axis in axes {
-            for angle in [0.0, 1e-12, 1e-4, 0.3, 1.5, 1.6, 3.0, 3.1, 3.14, PI - 1e-9] {
+            for angle in [
+                0.0,
+                1e-12,
+                1e-4,
+                0.3,
+                1.5,
+                1.6,
+                3.0,
+                3.1,
+                PI - 1e-3,
+                PI - 1e-9,
+            ] {
                 let turn = Vec3(axis) * angle;
                 let by = quat::matrix(quat::exp(turn));
                 let to = Mat3([by * from[0], by * from[1], by * from[2]]);

@@ -9,7 +9,6 @@ use crate::task::Task;
 use sim_model::Model;
 use sim_physics::constants::Recast;
 use sim_physics::lane::Real;
-use std::ops::Range;
 use std::sync::Arc;
 use std::thread;
 
@@ -118,8 +117,9 @@ impl Solver {
             }
         }
         for (what, array, columns, may_be_empty) in arrays {
-            let fits = array.len() == columns || array.len() == count * columns;
-            if !fits && !(may_be_empty && array.is_empty()) {
+            let lengths = [columns, count * columns];
+            let left_out = may_be_empty && array.is_empty();
+            if !(lengths.contains(&array.len()) || left_out) {
                 return Err(length(&what, array.len(), columns, count));
             }
             finite(&what, array)?;
@@ -215,12 +215,12 @@ fn in_threads<R: Real>(
     let rows = joint_q
         .chunks_mut((part * coords).max(1))
         .zip(solutions.chunks_mut(part));
-    let mut all: Vec<(Range<usize>, (&mut [f64], &mut [Solution]))> = ranges.zip(rows).collect();
-    let Some((range, (q, s))) = all.pop() else {
+    let mut parts = ranges.zip(rows);
+    let Some((range, (q, s))) = parts.next() else {
         return;
     };
     thread::scope(|scope| {
-        for (range, (q, s)) in all {
+        for (range, (q, s)) in parts {
             scope.spawn(move || work(job, range, q, s));
         }
         // the caller's thread works as well
