@@ -398,3 +398,42 @@ def test_adapters_take_it_and_views_are_those_of_a_ring(spread: Any) -> None:
     actions = np.zeros((WORLDS, 1))
     seen = [own.step(actions)[0] for _ in range(3)]
     assert np.shares_memory(seen[0], seen[2]) and not np.shares_memory(seen[0], seen[1])
+
+
+@pytest.mark.parametrize("shard", [0, 1])
+def test_a_shard_that_starts_again_with_another_version_is_refused(
+    spread: Any, monkeypatch: pytest.MonkeyPatch, shard: int
+) -> None:
+    own, fleet = spread("CartPoleBalance")
+    own.reset(seed=0)
+    opened = Shard.open
+    monkeypatch.setattr(Shard, "open", lambda *given: opened(*given)._replace(version="0.0.9"))
+    fleet.stop(shard)
+    with pytest.raises(tl.LaunchError, match=r"has tightloop 0\.0\.9 .* install the same tightloop"):
+        own.reset(seed=0)
+
+
+@pytest.mark.parametrize("at", ["call", "answers"])
+def test_an_interrupted_step_is_dropped_by_a_reset(
+    spread: Any, envs: Any, monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    own, fleet, one = pair(spread, envs, "NEXT_STEP", 50)
+    actions = np.zeros((WORLDS, 1))
+    usual, calls = getattr(fleet, at), 0
+
+    def interrupted(*given: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls == (2 if at == "call" else 1):  # between two shards
+            raise KeyboardInterrupt
+        return usual(*given)
+
+    monkeypatch.setattr(fleet, at, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        own.step(actions)
+    if at == "call":
+        with pytest.raises(tl.CommandRefused, match="the last step or reset failed; call reset first"):
+            own.step(actions)
+    mine, theirs = own.reset(seed=9), one.reset(seed=9)
+    assert_same_bits("observations", mine[0], theirs[0], np.ones(WORLDS, np.bool_))
+    assert_same_steps(own.step(actions), one.step(actions), np.ones(WORLDS, np.bool_))

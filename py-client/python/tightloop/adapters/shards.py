@@ -84,6 +84,8 @@ class Shards:
             ArgumentError: A time is not a number above 0.
         """
         self.rows, self.infos = list(rows), dict[int, ShardInfo]()
+        # what the others are compared with, also after it has gone
+        self._first: ShardInfo | None = None
         self._fleet, self._task, self._options = fleet, task, dict(options)
         self._launch_timeout = checks.number("launch_timeout", launch_timeout, above=0.0, error=ArgumentError)
         self._step_timeout = checks.number("step_timeout", step_timeout, above=0.0, error=ArgumentError)
@@ -132,8 +134,8 @@ class Shards:
         counts = {shard: self.rows[shard].stop - self.rows[shard].start for shard in shards}
         opens = {shard: ("open", self._task, count, self._options) for shard, count in counts.items()}
         started, lost = self.ask(opens, deadline - time.monotonic())
-        self.infos |= started
         self._check_alike(started)
+        self.infos |= started
         if begin is not None:
             started, lost_later = self.ask({shard: begin(shard) for shard in started}, deadline - time.monotonic())
             lost |= lost_later
@@ -192,9 +194,9 @@ class Shards:
 
     def _check_alike(self, started: Mapping[int, ShardInfo]) -> None:
         """Check that shards run the same version and the same scene."""
-        first = next(iter(self.infos.values()), None)
         for info in started.values():
-            if first is not None and (info.version, info.model_hash) != (first.version, first.model_hash):
+            first = self._first = self._first or info
+            if (info.version, info.model_hash) != (first.version, first.model_hash):
                 raise LaunchError(
                     f"{info.place} has tightloop {info.version} and model {info.model_hash}, another node "
                     f"{first.version} and {first.model_hash}; install the same tightloop, task and robot files on all"

@@ -102,7 +102,7 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         self._done = np.zeros(num_envs, np.bool_)
         self._last_privileged: NDArray[Any] | None = None
         self._calls: dict[int, Any] | None = None  # of the step in flight
-        self._ready = self._failed = False
+        self._ready = self._failed = self._interrupted = False
         self._shards = Shards(fleet, self.rows, task, options, launch_timeout=launch_timeout, step_timeout=step_timeout)
         try:
             self._shards.launch(dict.fromkeys(range(shards), "it has not started"))
@@ -174,6 +174,9 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
             ArgumentError: The mask, the seed or an option is not valid, or an observation is NaN.
             LaunchError: A shard could not start again in time.
         """
+        self._check_open("reset")
+        if self._interrupted:
+            self._drop()
         self._check_idle("reset")
         mask = reset_mask(options, self.num_envs, ready=self._ready)
         begun = np.ones(self.num_envs, np.bool_) if mask is None else mask
@@ -216,8 +219,12 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
 
     def step(self, actions: ArrayLike) -> Step:
         """Advance all worlds by one control step: `send`, then `recv`. Arguments, results and errors are theirs."""
-        self.send(actions)
-        return self.recv()
+        try:
+            self.send(actions)
+            return self.recv()
+        except KeyboardInterrupt:
+            self._interrupted = True
+            raise
 
     def send(self, actions: ArrayLike) -> None:
         """Send the actions of a step, and return at once; `recv` waits for the results.
@@ -246,6 +253,8 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         if given.dtype == np.float64:  # half the bytes; clipping after rounding gives the same bits as before it
             with np.errstate(over="ignore"):
                 given = given.astype(np.float32)
+        # an interrupt may leave the step with some shards only
+        self._ready, self._failed = False, True
         self._calls = self._shards.send({shard: ("step", given[rows]) for shard, rows in enumerate(self.rows)})
 
     def recv(self) -> Step:
@@ -269,11 +278,12 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         try:
             answers = self._shards.receive(self._calls)
         except KeyboardInterrupt:
-            raise  # `recv` may be called again
-        except BaseException:
-            self._calls, self._ready, self._failed = None, False, True
+            self._interrupted = True  # `recv` may be called again, or `reset`
             raise
-        self._calls, self._ready, self._failed = None, False, True
+        except BaseException:
+            self._calls = None
+            raise
+        self._calls, self._interrupted = None, False
         steps, lost = self._shards.sorted(answers)
         if lost:
             steps |= self._cut_off(lost)
@@ -354,6 +364,13 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         if self._ring is None:
             return StepBuffers(self.num_envs, self._last_obs.shape[1], self.task.dtype)
         return self._ring.next()
+
+    def _drop(self) -> None:
+        """Wait for the results of a step that was interrupted, and drop them."""
+        calls, self._calls = self._calls, None
+        if calls is not None:
+            self._shards.receive(calls)
+        self._interrupted = False
 
     def _check_open(self, call: str) -> None:
         if self.closed:

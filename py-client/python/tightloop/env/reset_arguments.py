@@ -44,5 +44,8 @@ def reset_mask(options: dict[str, Any] | None, worlds: int, *, ready: bool) -> N
     if not mask.any():
         raise ArgumentError("reset: options, reset_mask: no environment is to be reset; set at least one to True")
     if not ready and not mask.all():
-        raise ArgumentError("reset: options, reset_mask: the first reset is of all environments; leave the mask out")
+        raise ArgumentError(
+            "reset: options, reset_mask: the first reset is of all environments, and so is one "
+            "after a step that failed; leave the mask out"
+        )
     return mask
