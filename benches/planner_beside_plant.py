@@ -106,6 +106,8 @@ def main() -> int:
             busy.set()
             measured[SIDES[1]].append(from_python(plant, seconds, np.frombuffer(targets, np.float32)))
             busy.clear()
+            if not planner.is_alive():
+                raise SystemExit("the planner ended: without one, nothing is measured")
         planner.kill()
         planner.join()
     rows: list[dict[str, str | int]] = []
@@ -123,8 +125,7 @@ def main() -> int:
     print_table(rows)
     command = f"python benches/planner_beside_plant.py --seconds {TURNS * seconds} --priority {given.priority}"
     write_results("planner", rows, {"command": command, "period": "1 ms", "cores": os.cpu_count() or 1})
-    if more > ASKED:
-        print(f"the planner costs {more:.3f} percentage points of the deadlines, asked {ASKED}")
+    print(f"the planner costs {more:.3f} percentage points of the deadlines, asked at most {ASKED}")
     return int(more > ASKED)
 
 

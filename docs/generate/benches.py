@@ -172,6 +172,30 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
 """,
         {"side": "side", "p50_us": "median [µs]", "p99_us": "99 % [µs]", "p999_us": "99.9 % [µs]"},
     ),
+    "clients": Bench(
+        "Round trip of each client",
+        """The time from a command of a client to its frame, for one free body. The daemon has one thread.
+""",
+        {"client": "client", "p50_us": "median [µs]", "p99_us": "99 % [µs]", "asked_p50_us": "asked median [µs]"},
+    ),
+    "ray_cluster": Bench(
+        "Environments on a Ray cluster",
+        """A step of an environment, and the data that crosses for it. [Many machines](clusters.md) describes it.
+
+- The three nodes of the cluster are on one machine, so no network is measured. Daemons have one thread each.
+- Other programs used the machine as well.
+""",
+        {
+            "task": "task",
+            "worlds": "worlds",
+            "side": "side",
+            "sent_kB": "sent [kB]",
+            "received_kB": "received [kB]",
+            "p50_ms": "median [ms]",
+            "p99_ms": "99 % [ms]",
+            "learner_share": "learner's share",
+        },
+    ),
     "env": Bench(
         "Environments, beside EnvPool and gymnasium",
         """All sides step a pick-and-place task with random actions, on all cores, with NumPy in and out. Resets count.
