@@ -51,7 +51,7 @@ demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp w
 	@cargo build --release --quiet --workspace --example franka_lesson && "$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS)
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 # Debian packages come first: without root, the request for them appears before minutes of compiling.
 test: announce-test vulkan browser wheel $(VENV)/.dev $(VENV)/.docs ## every Rust and Python test
@@ -134,7 +134,7 @@ packages: wheel $(VENV)/.dev ## the wheel on every Python found, and the daemon 
 # `make test` itself.
 CROSS := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc \
   CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu"
-test-aarch64: $(VENV)/.dev ## physics, protocol, daemon and Python client for 64-bit ARM, emulated (an hour)
+test-aarch64: wheel $(VENV)/.dev ## physics, protocol, daemon and Python client for 64-bit ARM, emulated (an hour)
 	$(call debian,$(EMULATOR),an emulator of ARM and its compiler)
 	rustup target add aarch64-unknown-linux-gnu
 	env -u PYO3_PYTHON $(CROSS) tests/aarch64/run.sh $(PYTHON)
@@ -212,6 +212,7 @@ wheels: $(VENV)/.wheels ## wheels for other machines, manylinux_2_28 on x86-64 a
 	    --compatibility manylinux_2_28 --target $$architecture-unknown-linux-gnu --manifest-path py-client/Cargo.toml \
 	    --out out/dist || exit 1; done
 	$(PYTHON) tests/packaging/audit.py out/dist
+	$(PYTHON) tests/packaging/pythons.py out/dist
 
 # Each stamp file says that the packages of one requirements file are installed.
 $(VENV)/.demo: | $(PYTHON)

@@ -2,10 +2,10 @@
 # Makes a folder with Debian's Python for 64-bit ARM, the packages that tests import, and `python`, which runs it under
 # qemu. Needs no root, and changes nothing outside the folder.
 #
-#   tests/aarch64/python.sh FOLDER PIP
+#   tests/aarch64/python.sh FOLDER PYTHON
 set -euo pipefail
 folder=$(realpath -m "$1")
-pip=$2
+python=$2
 packages=(python3.11 python3.11-minimal libpython3.11-minimal libpython3.11-stdlib libc6 libgcc-s1 libstdc++6 libexpat1
   zlib1g libssl3 libffi8 libbz2-1.0 liblzma5 libsqlite3-0 libuuid1 libcrypt1)
 apt=(apt-get -qq -o APT::Architecture=arm64 -o APT::Architectures=arm64 -o Dir::State::lists="$folder/lists"
@@ -18,7 +18,7 @@ mkdir -p "$folder"/{lists/partial,cache/archives/partial,debs,root,site}
 for package in "$folder"/debs/*.deb; do
   dpkg-deb -x "$package" "$folder/root"
 done
-"$pip" -m pip install --quiet --disable-pip-version-check --upgrade --target "$folder/site" --python-version 3.11 \
+"$python" -m pip install --quiet --disable-pip-version-check --upgrade --target "$folder/site" --python-version 3.11 \
   --platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --only-binary :all: numpy 'gymnasium>=1.1,<2' pytest
 
 cat > "$folder/python" <<END

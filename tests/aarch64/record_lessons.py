@@ -1,6 +1,6 @@
 """Records the lesson's torques, targets and grasp on this machine, for a replay on another processor.
 
-    PYTHONPATH=examples python tests/aarch64/record_lessons.py FOLDER
+PYTHONPATH=examples python tests/aarch64/record_lessons.py FOLDER
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ def record(path: Path, scene: tl.Scene, precision: str, step: Callable[[tl.Sim, 
         command = [sys.executable, "-m", "tightloop", "record", sim.name, str(path), "--fields", "joint_q,joint_qd"]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as recorder:
             assert recorder.stderr is not None
-            recorder.stderr.readline()  # it says that it records
+            said = recorder.stderr.readline()  # it says that it records
             for frame in range(FRAMES):
                 step(sim, frame)
             sim.close()
             if recorder.wait():
-                raise SystemExit(recorder.stderr.read())
+                raise SystemExit(said + recorder.stderr.read())
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ target=aarch64-unknown-linux-gnu
 folder=out/aarch64
 built=${CARGO_TARGET_DIR:-target}/$target/release
 
+cargo nextest --version >/dev/null || { echo "install cargo-nextest: https://nexte.st"; exit 1; }
 cargo nextest run --release --target $target --workspace --config-file tests/aarch64/nextest.toml \
   -E "$(grep -v '^#' tests/aarch64/selection.txt)" --no-fail-fast
 # with the features of the tests, or all is built again
@@ -20,6 +21,7 @@ cp -r py-client/python/tightloop $folder/site/
 cp "$built/lib_core.so" $folder/site/tightloop/_core.abi3.so
 
 # lessons recorded on this machine have the same bits on the other
+rm -rf $folder/lessons
 PYTHONPATH=examples "$python" tests/aarch64/record_lessons.py $folder/lessons
 for lesson in $folder/lessons/*.tlrec; do
   PYTHONPATH=$folder/site $folder/python -m tightloop replay "$lesson"
