@@ -57,7 +57,13 @@ fn started(model: &Arc<Model>, seeds: &[usize], options: Options) -> Run {
 
 fn bits(run: &Run, world: usize) -> Vec<u64> {
     let numbers = FIELDS.iter().flat_map(|&field| run.get(field, world));
-    numbers.map(f64::to_bits).collect()
+    // on ARM, the compiler makes one instruction of a negated `fma` of scalars, which gives a zero the other sign
+    let zero = if cfg!(target_arch = "aarch64") {
+        0.0
+    } else {
+        -0.0
+    };
+    numbers.map(|x| (x + zero).to_bits()).collect()
 }
 
 /// Bits of all fields of each world in every frame.

@@ -10,7 +10,7 @@ folder=out/aarch64
 built=${CARGO_TARGET_DIR:-target}/$target/release
 
 cargo nextest --version >/dev/null || { echo "install cargo-nextest: https://nexte.st"; exit 1; }
-cargo nextest run --release --target $target --workspace --config-file tests/aarch64/nextest.toml \
+TIGHTLOOP_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" cargo nextest run --release --target $target --workspace --config-file tests/aarch64/nextest.toml \
   -E "$(grep -v '^#' tests/aarch64/selection.txt)" --no-fail-fast
 # with the features of the tests, or all is built again
 cargo build --release --target $target --workspace --lib --tests --quiet

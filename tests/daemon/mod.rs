@@ -39,9 +39,24 @@ pub fn scene() -> String {
     )
 }
 
+/// This very program, under the emulator that `TIGHTLOOP_RUNNER` names where it is for another processor.
+fn this_program() -> Command {
+    let program = std::env::current_exe().unwrap();
+    let runner = std::env::var("TIGHTLOOP_RUNNER").unwrap_or_default();
+    let mut words = runner.split_whitespace();
+    match words.next() {
+        None => Command::new(program),
+        Some(emulator) => {
+            let mut command = Command::new(emulator);
+            command.args(words).arg(program);
+            command
+        }
+    }
+}
+
 /// A process of this very program that runs a command line, its name left out.
 pub fn tightloop(line: &[&str]) -> Command {
-    let mut command = Command::new(std::env::current_exe().unwrap());
+    let mut command = this_program();
     command
         .args([
             "daemon_process",
