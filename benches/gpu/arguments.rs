@@ -79,6 +79,9 @@ pub struct Arguments {
     /// Price of one more dispatch, in simple statements; else what suits the adapter.
     #[arg(long)]
     pub dispatch_price: Option<usize>,
+    /// Only prints what each program takes on the device, by its time stamps, in one run of each scene; rows go to this file.
+    #[arg(long)]
+    pub kernel_times: Option<PathBuf>,
     /// What else the head of the file says, as `name: value`.
     #[arg(long)]
     pub fact: Vec<String>,

@@ -13,7 +13,7 @@
 #   3  threads per world, cuts of kernels                    240   splits.csv
 #   4  measured beside predicted                              10   predicted.csv
 #   5  tensors without copies                                 90   tensors.csv
-#   6  what the profiler sees                                120   profile.txt
+#   6  time stamps of the kernels, what the profiler sees    120   profile.txt
 #   7  MuJoCo-Warp and MJX, or published figures             300   peers.csv or published.csv
 #   8  the CPU of this machine                               120   speed.csv
 #
@@ -39,12 +39,12 @@ commit=$(cat "$here/commit")
 touch "$log" "$pieces"
 
 scenes="torque_free target grasp quadruped standing"
-counts="4096 16384 1024 65536" checks=4096,65536 seconds=1 tensors=()
+counts="4096 16384 1024 65536" checks=4096,65536 timed_worlds=4096,16384 seconds=1 tensors=()
 split_scenes="grasp standing" split_worlds="4096"
 ways=("" "--world-threads 1" "--world-threads 4" "--world-threads 16" "--kernel-size 12000" "--kernel-size 3000"
   "--dispatch-price 5000" "--dispatch-price 500" "--world-threads 32" "--kernel-size 24000")
 if [ -n "${CARD_QUICK:-}" ]; then
-  scenes="torque_free" counts="64 1024" checks=16,64 seconds=0.05 tensors=(--worlds 64 --frames 20)
+  scenes="torque_free" counts="64 1024" checks=16,64 timed_worlds=64 seconds=0.05 tensors=(--worlds 64 --frames 20)
   split_scenes="torque_free" split_worlds="64" ways=("" "--world-threads 4" "--kernel-size 3000")
 fi
 
@@ -235,12 +235,14 @@ stage_5() {
     --fact "clocks before: $(clocks)" "${tensors[@]}"
 }
 
-# Vulkan's kernels are invisible to ncu, which knows CUDA's. What it says is kept, and clocks and load beside it.
+# Time stamps of the kernels. Vulkan's are invisible to ncu, which knows CUDA's: what it says is kept, and clocks and load beside it.
 profiled() {
   local scene=${split_scenes%% *} worlds=${split_worlds%% *}
   local run=(--checks skip --brief --side gpu --scenes "$scene" --worlds "$worlds" --seconds "$seconds")
   local rc=0
-  echo "commit: $commit, date: $(date -u +%F), $scene with $worlds worlds"
+  echo "commit: $commit, date: $(date -u +%F)"
+  bench --checks skip --kernel-times "$here/cache/kernel_times.csv" --scenes "${scenes// /,}" --worlds "$timed_worlds" || rc=$?
+  echo "$scene with $worlds worlds:"
   if command -v nvidia-smi >/dev/null; then
     smi
     timeout --foreground 40 nvidia-smi dmon -s pucm -c 20 &
@@ -260,7 +262,7 @@ profiled() {
 }
 export -f profiled
 stage_6() {
-  export split_scenes split_worlds seconds
+  export scenes timed_worlds split_scenes split_worlds seconds
   piece 6/profile bash -c 'profiled >"$0" 2>&1' "$results/profile.txt"
 }
 

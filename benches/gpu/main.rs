@@ -9,6 +9,7 @@ mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod dump;
+mod kernel_times;
 mod measure;
 mod pages;
 mod report;
@@ -99,6 +100,9 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
     if arguments.checks == Checks::Only {
         return Ok(());
     }
+    if let Some(csv) = &arguments.kernel_times {
+        return time_kernels(arguments, place, csv);
+    }
     report.head();
     for &scene in &arguments.scenes {
         let plan = Plan::new(scene);
@@ -133,6 +137,22 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
     }
     if !arguments.brief {
         report.notes();
+    }
+    Ok(())
+}
+
+/// The programs of all scenes, timed on the device.
+fn time_kernels(arguments: &Arguments, place: &Place, csv: &Path) -> anyhow::Result<()> {
+    for &scene in &arguments.scenes {
+        let plan = Plan::new(scene);
+        for &worlds in &arguments.worlds {
+            let options = Options {
+                replay: Replay::Timed,
+                ..options(place, worlds, &FIELDS)
+            };
+            let (mut sim, _) = build(&plan, &options)?;
+            kernel_times::print(&mut sim, &plan, worlds, Some(csv))?;
+        }
     }
     Ok(())
 }

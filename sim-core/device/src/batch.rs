@@ -15,6 +15,8 @@ use std::sync::Arc;
 pub enum Replay {
     /// Recorded once. Only the Vulkan route can; elsewhere as `Encoded`.
     Recorded,
+    /// As `Recorded`, and the device notes when each command has ended: for benchmarks.
+    Timed,
     /// Encoded through wgpu at every run.
     Encoded,
 }
@@ -54,6 +56,18 @@ impl Device {
             failure: None,
             device: self.inner.clone(),
         }
+    }
+}
+
+impl Batch {
+    /// The commands with what each took on the device in the last run [s], the wait for those before it included. Empty without
+    /// `Replay::Timed`, on other routes, and before the first run.
+    pub fn seconds(&self) -> Vec<(&str, f64)> {
+        let seconds = match (&self.route, &self.device.vulkan) {
+            (Route::Recorded(recording), Some(vulkan)) => vulkan.seconds(recording),
+            _ => Vec::new(),
+        };
+        self.ops.iter().map(BatchOp::label).zip(seconds).collect()
     }
 }
 
@@ -146,9 +160,10 @@ impl BatchBuilder {
         }
         self.device.alive()?;
         let route = match (&self.device.vulkan, self.replay) {
-            (Some(vulkan), Replay::Recorded) => {
+            (Some(vulkan), Replay::Recorded | Replay::Timed) => {
                 let ops: Vec<_> = self.ops.iter().map(BatchOp::raw).collect();
-                Route::Recorded(vulkan.record(&ops).map_err(|e| {
+                let is_timed = self.replay == Replay::Timed;
+                Route::Recorded(vulkan.record(&ops, is_timed).map_err(|e| {
                     let reason = format!("recording: {e}");
                     self.device.failed(&e, DeviceError::Driver { reason })
                 })?)

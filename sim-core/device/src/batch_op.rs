@@ -49,6 +49,14 @@ pub(crate) struct Slot {
 }
 
 impl BatchOp {
+    /// Name of its program.
+    pub fn label(&self) -> &str {
+        match self {
+            BatchOp::Dispatch { program, .. } => &program.source.label,
+            BatchOp::Copy { .. } => "copy",
+        }
+    }
+
     /// The command for the Vulkan route.
     pub fn raw(&self) -> RawOp<'_, Pipeline, Handle> {
         match self {

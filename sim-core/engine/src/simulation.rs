@@ -173,6 +173,11 @@ impl Simulation {
     pub fn programs(&self) -> &[ProgramInfo] {
         self.backend.programs()
     }
+    /// What each command of the last frame took on a GPU, of its first tile [s]: the name of a program, or `copy`. Empty unless
+    /// `Options::replay` is `Replay::Timed`, and on the CPU.
+    pub fn seconds(&self) -> Vec<(&str, f64)> {
+        self.backend.seconds()
+    }
     /// Threads that a step uses.
     pub fn threads(&self) -> usize {
         self.backend.threads()

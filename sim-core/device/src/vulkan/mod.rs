@@ -6,6 +6,7 @@ mod export;
 mod memory;
 mod pipeline;
 mod recording;
+mod stamps;
 
 use export::Exports;
 pub(crate) use export::RawTimeline;
@@ -50,6 +51,8 @@ pub(crate) struct Vulkan {
     /// The driver's pipeline cache, which locks itself.
     cache: vk::PipelineCache,
     exports: Exports,
+    /// Duration of a tick of time stamps [s].
+    tick_s: f64,
     driver: String,
 }
 
@@ -171,6 +174,7 @@ unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) 
             trusts_pipelines,
             heaps: instance.get_physical_device_memory_properties(physical),
             family: hal.queue_family_index(),
+            tick_s: f64::from(known.limits.timestamp_period) * 1e-9,
             cache: vk::PipelineCache::null(),
             driver: format!(
                 "{}-{:08x}",

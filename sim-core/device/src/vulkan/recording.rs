@@ -2,6 +2,7 @@
 //!
 //! wgpu tracks nothing of a recording, so a full barrier stands before each command, and one for the host at the end of a run.
 
+use super::stamps::Stamps;
 use super::{Api, Failure, Handle, Pipeline, Vulkan};
 use crate::raw_op::{RawGroups, RawOp};
 use ash::vk;
@@ -11,17 +12,26 @@ pub(crate) struct Recording {
     commands: vk::CommandBuffer,
     pool: vk::CommandPool,
     descriptors: vk::DescriptorPool,
+    stamps: Option<Stamps>,
     device: ash::Device,
 }
 
 impl Vulkan {
-    /// Records commands that were checked. Their buffers and pipelines outlive the recording.
-    pub fn record(&self, ops: &[RawOp<'_, Pipeline, Handle>]) -> Result<Box<Recording>, Failure> {
+    /// Records commands that were checked, with a time stamp after each if `is_timed`. Their buffers and pipelines outlive the recording.
+    pub fn record(
+        &self,
+        ops: &[RawOp<'_, Pipeline, Handle>],
+        is_timed: bool,
+    ) -> Result<Box<Recording>, Failure> {
         let device = &self.device;
         let mut made = Box::new(Recording {
             commands: vk::CommandBuffer::null(),
             pool: vk::CommandPool::null(),
             descriptors: vk::DescriptorPool::null(),
+            stamps: match is_timed {
+                true => Stamps::new(device, ops.len())?,
+                false => None,
+            },
             device: device.clone(),
         });
         // SAFETY: all handles are of this device and alive; pools are this recording's own, and go with it.
@@ -44,8 +54,13 @@ impl Vulkan {
                     .flags(vk::CommandBufferUsageFlags::SIMULTANEOUS_USE)
                     .inheritance_info(&inherited),
             )?;
+            if let Some(stamps) = &made.stamps {
+                // a stamp after the wait for earlier batches, not before it
+                barrier(device, made.commands, Next::Work);
+                stamps.begin(made.commands);
+            }
             let mut sets = sets.into_iter();
-            for op in ops {
+            for (number, op) in ops.iter().enumerate() {
                 // also before the first: it waits for earlier batches and for wgpu's own commands
                 barrier(device, made.commands, Next::of(op));
                 match op {
@@ -86,6 +101,9 @@ impl Vulkan {
                         }];
                         device.cmd_copy_buffer(made.commands, from.0, to.0, &region);
                     }
+                }
+                if let Some(stamps) = &made.stamps {
+                    stamps.note(made.commands, number);
                 }
             }
             device.end_command_buffer(made.commands)?;
@@ -150,6 +168,12 @@ impl Vulkan {
             }
             Ok(sets)
         }
+    }
+
+    /// What the commands took in the last run [s]; empty where they are not timed or have not run.
+    pub fn seconds(&self, recording: &Recording) -> Vec<f64> {
+        let stamps = recording.stamps.as_ref();
+        stamps.map_or_else(Vec::new, |stamps| stamps.seconds(self.tick_s))
     }
 
     /// Puts recordings into an encoder of wgpu, which holds nothing else; what they write is seen by all that follows, the host too.

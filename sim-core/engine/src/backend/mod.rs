@@ -156,6 +156,10 @@ pub trait Backend: Send {
     fn programs(&self) -> &[ProgramInfo] {
         &[]
     }
+    /// What each command of the first tile's last frame took on the device [s]; empty where they are not timed, and on the CPU.
+    fn seconds(&self) -> Vec<(&str, f64)> {
+        Vec::new()
+    }
     /// Threads that a step may use.
     fn threads(&self) -> usize;
     /// Sets the bounds of faults, and what happens to faulted worlds.

@@ -95,6 +95,10 @@ impl Backend for Gpu {
         &self.compiled.info
     }
 
+    fn seconds(&self) -> Vec<(&str, f64)> {
+        self.tiles.first().map_or_else(Vec::new, Tile::seconds)
+    }
+
     fn set_faults(&mut self, faults: Faults) {
         self.faults = faults;
         let bounds = [faults.joint_q_max, faults.joint_qd_max].map(|x| (x as f32).to_bits());

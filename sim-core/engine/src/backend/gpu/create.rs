@@ -194,7 +194,7 @@ impl Gpu {
         if let Some(last) = tiles.last_mut()
             && let Some(drawn) = &drawn
         {
-            last.copy_out(&device, drawn, &frame, layout.bytes as u64)?;
+            last.copy_out(&device, &compiled, drawn, &frame, layout.bytes as u64)?;
         }
         let shape = Shape::of(m);
         let mut gpu = Gpu {

@@ -258,14 +258,22 @@ impl Tile {
     pub fn copy_out(
         &mut self,
         device: &Device,
+        compiled: &Compiled,
         drawn: &Buffer,
         frame: &Buffer,
         bytes: u64,
     ) -> Result<(), BackendError> {
-        let mut batch = device.batch(Replay::Recorded);
+        let mut batch = device.batch(compiled.replay);
         batch.copy(drawn, 0, frame, 0, bytes);
         self.copy_out = Some(batch.finish()?);
         Ok(())
+    }
+
+    /// What each command of its last frame took [s]; frames that the device writes to their readers lack the output.
+    pub fn seconds(&self) -> Vec<(&str, f64)> {
+        let batches = [&self.step, &self.show, &self.copy_out];
+        let batches = batches.into_iter().flatten();
+        batches.flat_map(Batch::seconds).collect()
     }
 
     /// The batch that steps and evaluates, or only evaluates.
