@@ -130,9 +130,14 @@ piece() {
   publish
 }
 
-# The Vulkan loader of the folder, where the machine has none; NVIDIA's driver where containers mount it.
+# The libraries of the folder that the machine lacks; NVIDIA's driver where containers mount it.
 drivers() {
-  ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1' || export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+  local name lacking=$here/cache/lib
+  mkdir -p "$lacking"
+  for name in "$here"/lib/*; do
+    ldconfig -p 2>/dev/null | grep -q "${name##*/} " || ln -sf "$name" "$lacking"
+  done
+  export LD_LIBRARY_PATH="$lacking${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
   local mounted=/usr/local/nvidia/share/vulkan/icd.d/nvidia_icd.json
   if [ -z "${VK_DRIVER_FILES:-}" ] && [ -e "$mounted" ] && ! ls /etc/vulkan/icd.d/nvidia* /usr/share/vulkan/icd.d/nvidia* >/dev/null 2>&1; then
     export VK_DRIVER_FILES=$mounted

@@ -14,9 +14,11 @@ mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/r
 strip -o "$folder/gpu_bench" "${CARGO_TARGET_DIR:-target}/release/examples/gpu_bench"
 gzip -6 "$folder/gpu_bench"
 cp .venv/wheels/*.whl "$@" "$folder/wheels"
-# the loader of this computer, for machines that have a driver without one
-loader=$(ldconfig -p | awk '/libvulkan\.so\.1 / {print $NF; exit}')
-[ -z "$loader" ] || cp -L "$loader" "$folder/lib/libvulkan.so.1"
+# libraries of this computer, for machines that have a driver without them: the loader, and what NVIDIA's driver is not found without
+for name in libvulkan.so.1 libEGL.so.1 libGL.so.1 libGLX.so.0 libGLdispatch.so.0 libOpenGL.so.0; do
+  found=$(ldconfig -p | awk -v name="$name" '$1 == name {print $NF; exit}')
+  [ -z "$found" ] || cp -L "$found" "$folder/lib/$name"
+done
 cp benches/gpu/card.sh "$folder"
 cp benches/gpu/card_report.py benches/gpu/peers.py benches/gpu/tensors.py benches/gpu/published.csv "$folder/benches/gpu"
 cp -r benches/results/gpu_offline "$folder/benches/results"

@@ -1,11 +1,13 @@
 //! What each program of a frame takes on the device, by its time stamps.
 
+use crate::measure::wake;
 use crate::scenes::{Plan, WorldSet};
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
+use std::time::Instant;
 
 /// Frames that do not count.
 const WARM_UP: usize = 5;
@@ -22,15 +24,21 @@ pub fn print(
 ) -> anyhow::Result<()> {
     let mut words = vec![0; sim.layout().bytes / 8];
     let crowd = WorldSet::all(worlds);
-    let mut values = Vec::new();
+    let commands = plan.commands(&crowd);
     let mut programs: Vec<Times> = Vec::new();
+    let mut host = [0.0; 2];
     plan.start(sim, &crowd);
-    for frame in 0..plan.frames() {
-        plan.fill(frame, &crowd, &mut values);
-        sim.command(plan.field, 0..plan.model.dofs(), Values::F32(&values))?;
+    wake(sim, &mut words);
+    for (frame, values) in commands.iter().enumerate() {
+        let begin = Instant::now();
+        sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
+        let commanded = Instant::now();
         sim.step(&mut words);
+        let done = Instant::now();
         if frame >= WARM_UP {
             add(&mut programs, &sim.seconds());
+            host[0] += (commanded - begin).as_secs_f64();
+            host[1] += (done - commanded).as_secs_f64();
         }
     }
     let mut file = csv
@@ -57,6 +65,9 @@ pub fn print(
         }
     }
     println!("{:<24} {:>10} {whole:>10.1}", "all", "");
+    let [command, step] = host.map(|sum| 1e6 * sum / (commands.len() - WARM_UP) as f64);
+    println!("{:<24} {:>10} {command:>10.1}", "of the host: command", "");
+    println!("{:<24} {:>10} {step:>10.1}", "of the host: step", "");
     Ok(())
 }
 

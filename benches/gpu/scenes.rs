@@ -224,6 +224,17 @@ impl Plan {
             .expect("the cube's coordinates");
     }
 
+    /// The commands of all frames, made ahead: a GPU that waits for them in each frame lowers its clocks.
+    pub fn commands(&self, crowd: &WorldSet) -> Vec<Vec<f32>> {
+        let frames = 0..self.frames();
+        let commands = frames.map(|frame| {
+            let mut values = Vec::with_capacity(crowd.len() * self.model.dofs());
+            self.fill(frame, crowd, &mut values);
+            values
+        });
+        commands.collect()
+    }
+
     /// The commands of a frame, `(worlds, dofs)`: of the grasp the recorded ones, otherwise of an amplitude of each world's own.
     pub fn fill(&self, frame: usize, crowd: &WorldSet, values: &mut Vec<f32>) {
         values.clear();

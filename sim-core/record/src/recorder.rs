@@ -47,6 +47,8 @@ impl Cx for Recorder {
     type Block = RecordedBlock;
     type List = RecordedList;
 
+    const GATHERS_LOADS: bool = true;
+
     #[track_caller]
     fn var(&mut self, x: Recorded) -> RecordedVariable {
         with(Location::caller(), |s| {

@@ -1,6 +1,7 @@
 //! Commands recorded once, as a secondary command buffer that runs any number of times.
 //!
-//! wgpu tracks nothing of a recording, so a full barrier stands before each command, and one for the host at the end of a run.
+//! wgpu tracks nothing of a recording, so a barrier stands before each command, and one for the host at the end of a run. It waits for all
+//! that a command may do; between two programs only for programs.
 
 use super::stamps::Stamps;
 use super::{Api, Failure, Handle, Pipeline, Vulkan};
@@ -56,13 +57,15 @@ impl Vulkan {
             )?;
             if let Some(stamps) = &made.stamps {
                 // a stamp after the wait for earlier batches, not before it
-                barrier(device, made.commands, Next::Work);
+                barrier(device, made.commands, Before::Any, Next::Work);
                 stamps.begin(made.commands);
             }
             let mut sets = sets.into_iter();
+            let mut before = Before::Any;
             for (number, op) in ops.iter().enumerate() {
                 // also before the first: it waits for earlier batches and for wgpu's own commands
-                barrier(device, made.commands, Next::of(op));
+                barrier(device, made.commands, before, Next::of(op));
+                before = Before::of(op);
                 match op {
                     RawOp::Dispatch {
                         pipeline, groups, ..
@@ -191,9 +194,27 @@ impl Vulkan {
                 if !commands.is_empty() {
                     self.device.cmd_execute_commands(primary, &commands);
                 }
-                barrier(&self.device, primary, Next::Host);
+                barrier(&self.device, primary, Before::Any, Next::Host);
                 true
             })
+        }
+    }
+}
+
+/// What comes before a barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Before {
+    /// Any work.
+    Any,
+    /// A program, which has waited for all before it.
+    Program,
+}
+
+impl Before {
+    fn of<P, B>(op: &RawOp<'_, P, B>) -> Before {
+        match op {
+            RawOp::Dispatch { .. } => Before::Program,
+            RawOp::Copy { .. } => Before::Any,
         }
     }
 }
@@ -201,6 +222,8 @@ impl Vulkan {
 /// What comes after a barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Next {
+    /// A program.
+    Program,
     /// A program or a copy.
     Work,
     /// A program whose number of workgroups another program may have written.
@@ -216,7 +239,8 @@ impl Next {
                 groups: RawGroups::Found(..),
                 ..
             } => Next::Found,
-            _ => Next::Work,
+            RawOp::Dispatch { .. } => Next::Program,
+            RawOp::Copy { .. } => Next::Work,
         }
     }
 }
@@ -225,14 +249,23 @@ impl Next {
 ///
 /// # Safety
 /// `commands` is being recorded.
-unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, next: Next) {
+unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, before: Before, next: Next) {
     use vk::AccessFlags as Access;
     use vk::PipelineStageFlags as Stage;
     let work = Stage::COMPUTE_SHADER | Stage::TRANSFER;
     let written = Access::SHADER_WRITE | Access::TRANSFER_WRITE;
     let used = written | Access::SHADER_READ | Access::TRANSFER_READ;
+    let programs = (
+        Stage::COMPUTE_SHADER,
+        Access::SHADER_READ | Access::SHADER_WRITE,
+    );
+    let (from, written) = match (before, next) {
+        (Before::Program, Next::Program) => (Stage::COMPUTE_SHADER, Access::SHADER_WRITE),
+        _ => (work, written),
+    };
     let (to, reads) = match next {
-        Next::Work => (work, used),
+        Next::Program if before == Before::Program => programs,
+        Next::Program | Next::Work => (work, used),
         Next::Found => (
             work | Stage::DRAW_INDIRECT,
             used | Access::INDIRECT_COMMAND_READ,
@@ -244,7 +277,7 @@ unsafe fn barrier(device: &ash::Device, commands: vk::CommandBuffer, next: Next)
         .dst_access_mask(reads)];
     let flags = vk::DependencyFlags::empty();
     // SAFETY: as promised by the caller.
-    unsafe { device.cmd_pipeline_barrier(commands, work, to, flags, &memory, &[], &[]) };
+    unsafe { device.cmd_pipeline_barrier(commands, from, to, flags, &memory, &[], &[]) };
 }
 
 impl Drop for Recording {

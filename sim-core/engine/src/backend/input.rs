@@ -112,9 +112,19 @@ impl Values<'_> {
     pub fn first_not_finite(&self, part: Range<usize>, precision: Precision) -> Option<usize> {
         let first = part.start;
         let place = match self {
-            Values::F32(v) => v[part].iter().position(|x| !x.is_finite()),
-            Values::F64(v) => (v[part].iter()).position(|&x| !precision.round(x).is_finite()),
+            Values::F32(v) => first_bad(&v[part], |x| x.is_finite()),
+            Values::F64(v) => first_bad(&v[part], |x| precision.round(x).is_finite()),
         };
         place.map(|place| first + place)
     }
+}
+
+/// The place of the first value that is not good. Blocks are tested without a branch per value.
+fn first_bad<T: Copy>(values: &[T], is_good: impl Fn(T) -> bool) -> Option<usize> {
+    const BLOCK: usize = 64;
+    let is_whole = |block: &[T]| block.iter().fold(true, |all, &x| all & is_good(x));
+    let block = values.chunks(BLOCK).position(|block| !is_whole(block))?;
+    let from = block * BLOCK;
+    let place = values[from..].iter().position(|&x| !is_good(x));
+    place.map(|place| from + place)
 }

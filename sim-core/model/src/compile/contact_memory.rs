@@ -61,6 +61,7 @@ impl ContactBuilder<'_> {
             pair_numbers,
             pair_indices,
             class_rows,
+            pair_blocks: Fixed::default(),
         };
         // whose features are clipped by scratch tables, besides hulls
         let is_clipped = |piece: &&Piece| matches!(piece.solid.kind, Kind::Cylinder | Kind::Field);

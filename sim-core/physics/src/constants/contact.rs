@@ -5,6 +5,8 @@ use super::height_field::FieldTables;
 use super::hull::HullTables;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
+use std::fmt;
+use std::ops::Range;
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,7 +134,7 @@ impl FrictionCombine {
 }
 
 /// Tables of the model.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 pub struct Handles {
     /// Scalars of a pair; see [`pair`].
     pub pair_numbers: Fixed,
@@ -140,7 +142,24 @@ pub struct Handles {
     pub pair_indices: Fixed,
     /// First row and capacity of a class.
     pub class_rows: Fixed,
+    /// Blocks of pairs of the same kinds: each has [`BLOCK`] pairs, the last one as often as it takes, and the pair after its last.
+    /// Without rows where pairs are tested one by one.
+    pub pair_blocks: Fixed,
 }
+
+// models are told apart by their `Debug` text, and blocks are no part of a model
+impl fmt::Debug for Handles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Handles")
+            .field("pair_numbers", &self.pair_numbers)
+            .field("pair_indices", &self.pair_indices)
+            .field("class_rows", &self.class_rows)
+            .finish()
+    }
+}
+
+/// Pairs of a block.
+pub const BLOCK: usize = 8;
 
 /// Scratch tables.
 #[derive(Clone, Copy, Debug)]
@@ -417,6 +436,23 @@ impl<R> Contacts<R> {
     #[inline(always)]
     pub fn group(&self, kinds: (Kind, Kind)) -> Option<&Group> {
         self.groups.iter().find(|group| group.kinds == kinds)
+    }
+
+    /// The blocks of a group, as rows of `pair_blocks`; empty where its pairs are tested one by one.
+    pub fn blocks(&self, kinds: (Kind, Kind)) -> Range<usize> {
+        let before = self.groups.iter().take_while(|group| group.kinds != kinds);
+        let first = before.map(Group::blocks).sum();
+        first..first + self.group(kinds).map_or(0, Group::blocks)
+    }
+}
+
+impl Group {
+    /// How many blocks its pairs make: none of a few pairs, where a block costs more than it saves.
+    pub fn blocks(&self) -> usize {
+        match self.end - self.first {
+            ..=BLOCK => 0,
+            pairs => pairs.div_ceil(BLOCK),
+        }
     }
 }
 

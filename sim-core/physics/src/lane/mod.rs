@@ -266,6 +266,9 @@ pub trait Cx: Sized {
 
     /// Do all worlds of a block run each instruction, active or not? Then what some need is computed for all.
     const LOCKSTEP: bool = false;
+    /// Does a backend wait long for what it loads, and is its code recorded? Then loads that do not depend on each other stand
+    /// together.
+    const GATHERS_LOADS: bool = false;
     /// Values that loops change: the values themselves on a backend where those are cells, else the cells. Call
     /// [`Cx::put_values`] before, and [`Cx::get_values`] after.
     #[inline(always)]

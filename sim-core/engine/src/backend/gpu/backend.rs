@@ -30,7 +30,7 @@ pub(super) struct Gpu {
     pub compiled: Compiled,
     /// The frame in host memory.
     pub frame: Staging,
-    /// The frame in device memory, where that is separate.
+    /// The frame in device memory, where it is not written to host memory at once.
     pub drawn: Option<Buffer>,
     /// Whether the driver imports the memory of readers.
     pub imports: bool,

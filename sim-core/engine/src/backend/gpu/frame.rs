@@ -102,6 +102,9 @@ impl Gpu {
             .steps
             .copy_from_slice(words::array::<u64>(arena, at_step, 8 * worlds));
         let found: &mut [u32] = words::array(arena, at_status, 4 * worlds);
+        if *found == self.mirror.status[..] {
+            return;
+        }
         for (world, &now) in found.iter().enumerate() {
             let before = self.mirror.status[world];
             if counts && now & status::FROZEN != 0 && before & status::FROZEN == 0 {

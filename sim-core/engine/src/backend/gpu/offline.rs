@@ -1,5 +1,6 @@
 //! The kernels of a model without a device, as benches/gpu/offline judges them.
 
+use super::blocks::with_blocks;
 use super::bookkeeping;
 use super::merged::merged;
 use super::places::Places;
@@ -74,7 +75,7 @@ impl Offline {
     ) -> Result<Offline, BackendError> {
         let constants: Constants<f32> = match lanes {
             1 => model.constants().cast(),
-            _ => merged(model.constants()).cast(),
+            _ => with_blocks(merged(model.constants())).cast(),
         };
         let m = &constants;
         let computed: Vec<(Field, usize)> = show::computed(layout);

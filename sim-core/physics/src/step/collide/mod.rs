@@ -53,7 +53,7 @@ use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
+    BLOCK, COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
 };
 use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
@@ -123,6 +123,9 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
 #[inline(always)]
 fn collide_group<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
     if let Some(group) = t.group(N::KINDS) {
+        if C::GATHERS_LOADS && t.handles.pair_blocks.rows > 0 && group.blocks() > 0 {
+            return collide_blocks::<C, N>(cx, t);
+        }
         let (first, end) = (cx.at(group.first), cx.at(group.end));
         span!(cx, p in first, end, {
             collide_pair::<C, N>(cx, t, p);
@@ -130,26 +133,104 @@ fn collide_group<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>
     }
 }
 
+/// As [`collide_group`], with the bounding spheres of a block of pairs tested together: a GPU's thread waits once for the loads of all of
+/// them. Then the near pairs are taken in their order.
+#[inline(always)]
+fn collide_blocks<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
+    let (blocks, pairs) = (t.handles.pair_blocks, t.pairs.len());
+    let rows = t.blocks(N::KINDS);
+    let (first, end) = (cx.at(rows.start), cx.at(rows.end));
+    let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
+    span!(cx, block in first, end, {
+        // pair k is bit k of a whole number
+        let mut near = zero;
+        for k in 0..BLOCK {
+            let p = cx.index(blocks, block, k, pairs);
+            let is_near = PairTest::read(cx, t, p).spheres_near::<N>(cx, t, p);
+            near = near + C::F::select(is_near, C::F::c(f64::from(1u32 << k)), zero);
+        }
+        when!(cx, half.lt(near), {
+            let mut rest = cx.var(near);
+            let first = cx.index(blocks, block, 0, pairs);
+            let end = cx.index(blocks, block, BLOCK, pairs + 1);
+            span!(cx, p in first, end, {
+                let now = cx.get(&rest);
+                let others = now.fma(half, C::F::c(-0.25)).round();
+                cx.set(&mut rest, others);
+                let is_near = half.lt(C::F::c(2.0).fnma(others, now));
+                when!(cx, is_near, {
+                    collide_pair::<C, N>(cx, t, p);
+                });
+            });
+        });
+    });
+}
+
+/// Where the shapes of a pair are.
+struct PairTest<C: Cx> {
+    a: C::I,
+    b: C::I,
+    /// Centre of the first shape relative to its origin [m].
+    center_a: Vec3<C::F>,
+    origin_a: Vec3<C::F>,
+    /// Centre of the second shape relative to that of the first [m].
+    center: Vec3<C::F>,
+}
+
+impl<C: Cx> PairTest<C> {
+    #[inline(always)]
+    fn read(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> PairTest<C> {
+        let indices = t.handles.pair_indices;
+        let (poses, origins) = (t.memory.poses, t.memory.origins);
+        let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
+        let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
+        let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
+        let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
+        let center_a = load_vec3(cx, poses, a, 9);
+        let origin_a = load_vec3(cx, origins, origin_a, 0);
+        let between = load_vec3(cx, origins, origin_b, 0) - origin_a;
+        let center = (load_vec3(cx, poses, b, 9) - center_a) + between;
+        PairTest {
+            a,
+            b,
+            center_a,
+            origin_a,
+            center,
+        }
+    }
+
+    /// Do the bounding spheres overlap, or that of the second shape and the plane?
+    #[inline(always)]
+    fn spheres_near<N: Narrow>(
+        &self,
+        cx: &mut C,
+        t: &Contacts<<C::F as Num>::Real>,
+        p: C::I,
+    ) -> MaskOf<C> {
+        let radius = cx.constant(t.handles.pair_numbers, p, pair::RADIUS);
+        match N::KINDS.0 {
+            Kind::Plane => load_vec3(cx, t.memory.poses, self.a, 6)
+                .dot(self.center)
+                .lt(radius),
+            _ => self.center.dot(self.center).lt(radius * radius),
+        }
+    }
+}
+
 /// Adds the contacts of a pair that the broad phase does not reject.
 #[inline(always)]
 fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
     let kinds = N::KINDS;
-    let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
-    let (poses, origins) = (t.memory.poses, t.memory.origins);
-    let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
-    let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
-    let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
-    let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
-    let center_a = load_vec3(cx, poses, a, 9);
-    let origin_a = load_vec3(cx, origins, origin_a, 0);
-    let between = load_vec3(cx, origins, origin_b, 0) - origin_a;
-    let center = (load_vec3(cx, poses, b, 9) - center_a) + between;
-    // bounding spheres
-    let radius = cx.constant(scalars, p, pair::RADIUS);
-    let near = match kinds.0 {
-        Kind::Plane => load_vec3(cx, poses, a, 6).dot(center).lt(radius),
-        _ => center.dot(center).lt(radius * radius),
-    };
+    let (scalars, poses) = (t.handles.pair_numbers, t.memory.poses);
+    let test = PairTest::read(cx, t, p);
+    let near = test.spheres_near::<N>(cx, t, p);
+    let PairTest {
+        a,
+        b,
+        center_a,
+        origin_a,
+        center,
+    } = test;
     when!(cx, near, {
         let axes_a = axes_of(cx, poses, a);
         let shape_a = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
