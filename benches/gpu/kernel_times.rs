@@ -44,6 +44,14 @@ pub fn print(
     let mut file = csv
         .map(|path| OpenOptions::new().append(true).create(true).open(path))
         .transpose()?;
+    if let Some(file) = &mut file
+        && file.metadata()?.len() == 0
+    {
+        writeln!(
+            file,
+            "scene,worlds,program,dispatches,mean_us,p50_us,max_us"
+        )?;
+    }
     let name = plan.scene.name();
     println!("\n{name}, {worlds} worlds: what the device's time stamps say, of a frame");
     println!(

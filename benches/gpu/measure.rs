@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 /// Frames that do not count: caches and pages are cold.
 const WARM_UP: usize = 5;
-/// A GPU lowers its clocks within milliseconds of idling, and a reset is such a time. So long it is kept busy before a run.
+/// How long the GPU is kept busy before a run: one that idles, as during a reset, lowers its clocks within milliseconds.
 const AWAKE: Duration = Duration::from_millis(200);
 /// Times the wanted duration, after which a run is left before its end.
 const PATIENCE: u32 = 10;

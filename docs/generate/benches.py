@@ -343,6 +343,7 @@ machines were busy.
 
 - Every adapter below is named in the table of its source. Mesa's llvmpipe is a software driver: it runs on the CPU.
 - On llvmpipe, `device="gpu"` is slower than `device="cpu"` on the same cores. `GPU/CPU` shows the ratio.
+- A rate is of the median frame. `whole run` is of all frames: the grasp touches its cube in a third of them.
 - `cold` is the first build of a model, `cached` a later build.
 """,
         {
@@ -352,10 +353,58 @@ machines were busy.
             "cold_s": "cold [s]",
             "cached_s": "cached [s]",
             "steps_per_s": "GPU steps/s",
+            "steps_per_s_whole": "whole run",
             "cpu_steps_per_s": "CPU steps/s",
             "gpu_over_cpu": "GPU/CPU",
             "frame_p50_ms": "frame, median [ms]",
             "frame_p99_ms": "frame, 99 % [ms]",
+        },
+    ),
+    "gpu_peers": Bench(
+        "Other engines on a GPU",
+        """`benches/gpu/peers.py` runs scenes of the GPU backend's table in MuJoCo-Warp and MJX, where they are
+installed.
+
+- The same: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0.
+- Not the same: all of their worlds are alike, and each engine finds contacts by its own means.
+- `cold` includes compiling where the kernels were not kept. The first grasp of all did not end within 150 s.
+""",
+        {
+            "side": "engine",
+            "scene": "scene",
+            "worlds": "worlds",
+            "cold_s": "cold [s]",
+            "steps_per_s": "steps/s",
+            "steps_per_s_whole": "whole run",
+            "frame_p50_ms": "frame, median [ms]",
+            "frame_p99_ms": "frame, 99 % [ms]",
+        },
+    ),
+    "gpu_tensors": Bench(
+        "Tensors on the GPU",
+        """A policy of one matrix product in torch steps arms in the daemon. With views, positions are sent to the card
+and targets are fetched from it. With tensors, both stay there.
+
+- The card takes turns between the two processes. With few worlds this costs more than the copies.
+""",
+        {"worlds": "worlds", "views_us": "frame with views [µs]", "tensors_us": "with tensors [µs]"},
+    ),
+    "gpu_cuts": Bench(
+        "Threads per world and sizes of kernels on a GPU",
+        "The time of a frame's programs by time stamps of the device, with other cuts than those that are built in.\n",
+        {"options": "options", "scene": "scene", "worlds": "worlds", "device_us": "frame [µs]"},
+    ),
+    "gpu_kernels": Bench(
+        "Programs of a frame on a GPU",
+        "`gpu_bench --kernel-times FILE` notes when each program of a frame ends, by time stamps of the device.\n",
+        {
+            "scene": "scene",
+            "worlds": "worlds",
+            "program": "program",
+            "dispatches": "dispatches",
+            "mean_us": "mean [µs]",
+            "p50_us": "median [µs]",
+            "max_us": "longest [µs]",
         },
     ),
     "viewer": Bench(

@@ -19,11 +19,12 @@ for package in "$folder"/debs/*.deb; do
   dpkg-deb -x "$package" "$folder/root"
 done
 "$python" -m pip install --quiet --disable-pip-version-check --upgrade --target "$folder/site" --python-version 3.11 \
-  --platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --only-binary :all: numpy 'gymnasium>=1.1,<2' pytest
+  --platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --platform manylinux_2_17_aarch64 --only-binary :all: numpy 'gymnasium>=1.1,<2' pytest \
+  'mujoco==3.17.*' safetensors
 
 cat > "$folder/python" <<END
 #!/bin/sh
-exec qemu-aarch64 -L "$folder/root" "$folder/root/usr/bin/python3.11" "\$@"
+MUJOCO_GL=disable exec qemu-aarch64 -L "$folder/root" "$folder/root/usr/bin/python3.11" "\$@"
 END
 chmod +x "$folder/python"
 # a child is started with the emulator, too

@@ -8,7 +8,7 @@ use std::ptr::null_mut;
 
 const FIELDS: [Field; 3] = [Field::JointQ, Field::JointQd, Field::BodyQ];
 /// Where the arena begins: frames have a head before it.
-const HEAD: usize = 1024;
+const HEAD: usize = 1024 + 64;
 
 #[test]
 fn what_the_device_writes_is_read_through_another_mapping_and_nothing_is_copied() {

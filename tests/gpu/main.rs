@@ -2,6 +2,7 @@
 
 mod agreement;
 mod auto;
+mod blocks;
 mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,5 +1,6 @@
 //! What the host sends and what frames show: every word of every world, on cards with and without their own memory.
 
+use crate::blocks;
 use crate::common::{Demo, Run, lesson, noise};
 use crate::{assert_alive, gpu, options, run};
 use sim_engine::backend::Values;
@@ -54,7 +55,6 @@ fn commands_and_rows_of_odd_widths_reach_every_world_of_several_tiles() {
 
 #[test]
 fn a_card_with_its_own_memory_shows_what_shared_memory_shows() {
-    let model = lesson(Demo::Target).compile().unwrap();
     let fields = [
         Field::JointQ,
         Field::JointQd,
@@ -64,6 +64,7 @@ fn a_card_with_its_own_memory_shows_what_shared_memory_shows() {
         Field::BiasForce,
         Field::MassMatrix,
     ];
+    let model = lesson(Demo::Target).compile().unwrap();
     let arenas = [false, true].map(|discrete| {
         open_as_discrete(discrete);
         let mut run = run(&model, gpu(), 70, &fields);
@@ -83,6 +84,35 @@ fn a_card_with_its_own_memory_shows_what_shared_memory_shows() {
     });
     assert!(arenas[0].0 == arenas[1].0);
     assert!(arenas[0].1 == arenas[1].1);
+}
+
+/// Such frames are drawn in device memory, and copied.
+#[test]
+fn a_card_with_its_own_memory_shows_contacts() {
+    let fields = [Field::JointQ, Field::ContactCount, Field::ContactDistance];
+    let model = blocks::scene(2);
+    let runs = [false, true].map(|discrete| {
+        open_as_discrete(discrete);
+        let mut run = run(&model, gpu(), 70, &fields);
+        open_as_discrete(false);
+        run.step();
+        assert_alive(&run);
+        run
+    });
+    for world in 0..70 {
+        let [count, other] = [0, 1].map(|k: usize| runs[k].get(Field::ContactCount, world)[0]);
+        assert_eq!(count, other, "world {world}");
+        assert!(count >= 1.0, "the ball touches another");
+        for (field, shown) in [
+            (Field::JointQ, model.coords()),
+            (Field::ContactDistance, count as usize),
+        ] {
+            let [a, b] = [0, 1].map(|k: usize| runs[k].get(field, world));
+            let both = a[..shown].iter().zip(&b[..shown]);
+            let worst = both.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+            assert!(worst < 1e-6, "world {world}, {field:?}: {worst:e}");
+        }
+    }
 }
 
 #[test]

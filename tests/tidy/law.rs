@@ -349,7 +349,7 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 39] = [
+pub const UNSAFE: [&str; 40] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -359,6 +359,7 @@ pub const UNSAFE: [&str; 39] = [
     "sim-core/device/src/vulkan/mod.rs",           // the driver's handles
     "sim-core/device/src/vulkan/pipeline.rs",      // as mod.rs
     "sim-core/device/src/vulkan/recording.rs",     // as mod.rs
+    "sim-core/device/src/vulkan/stamps.rs",        // as mod.rs
     "sim-core/device/src/vulkan_absent.rs",        // the same functions, never called
     "sim-core/engine/src/backend/cpu/backend.rs",  // calls what dispatch chose
     "sim-core/engine/src/backend/cpu/contacts.rs", // rows of a frame, as transfer.rs

@@ -8,7 +8,7 @@ use thiserror::Error;
 pub enum DeviceError {
     /// No driver offers an adapter.
     #[error(
-        "no adapter found: install a Vulkan driver (software: `apt-get install mesa-vulkan-drivers libvulkan1`; NVIDIA's is not found without `libvulkan1 libegl1 libgl1`, and a container mounts it only with NVIDIA_DRIVER_CAPABILITIES=all)"
+        "no adapter found: install a Vulkan driver (software: `apt-get install mesa-vulkan-drivers libvulkan1`; NVIDIA's is not found without `libvulkan1 libegl1 libgl1`)"
     )]
     NoAdapter,
     /// None of the adapters is the requested one.

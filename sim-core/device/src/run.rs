@@ -146,15 +146,24 @@ impl Inner {
         // waiting also lets wgpu report why it took no commands
         self.alive()?;
         match done {
-            Ok(_) if accepted => Ok(()),
+            Ok(_) if accepted => {
+                if let Some(vulkan) = &self.vulkan {
+                    let routes = batches.iter().map(|batch| &batch.route);
+                    let recorded = routes.filter_map(|route| match route {
+                        Route::Recorded(recording) => Some(&**recording),
+                        Route::Encoded(_) => None,
+                    });
+                    recorded.for_each(|recording| vulkan.done(recording));
+                }
+                Ok(())
+            }
             Ok(_) => Err(self.lose("its commands are not taken")),
             Err(e) => Err(self.lose(&format!("waiting for a run: {e}"))),
         }
     }
 }
 
-/// How long a run is watched before the thread sleeps. To be woken takes some 50 µs or more, in a virtual machine 100 µs; most frames take less
-/// than this.
+/// How long a run is watched before the thread sleeps: a thread that sleeps is woken late, and most frames take less than this.
 const WATCHED: Duration = Duration::from_millis(2);
 
 impl Inner {
@@ -164,13 +173,13 @@ impl Inner {
         if self.info.kind != AdapterKind::Software {
             let since = Instant::now();
             while since.elapsed() < WATCHED {
-                let status = self.wgpu.poll(wgpu::PollType::Poll)?;
-                if status.is_queue_empty() {
-                    return Ok(status);
+                if self.wgpu.poll(wgpu::PollType::Poll)?.is_queue_empty() {
+                    break;
                 }
                 std::thread::yield_now();
             }
         }
+        // returns at once after the above, but reports a submission that was not accepted
         self.wgpu.poll(wgpu::PollType::Wait {
             submission_index: Some(index),
             timeout: None,

@@ -142,6 +142,10 @@ impl Vulkan {
         match self.0 {}
     }
 
+    pub fn done(&self, _: &Recording) {
+        match self.0 {}
+    }
+
     pub fn execute(&self, _: &mut wgpu::CommandEncoder, _: &[&Recording]) -> bool {
         match self.0 {}
     }

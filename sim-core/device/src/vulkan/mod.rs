@@ -13,6 +13,7 @@ pub(crate) use export::RawTimeline;
 pub(crate) use memory::{Handle, Made, Mapped};
 pub(crate) use pipeline::Pipeline;
 pub(crate) use recording::Recording;
+use stamps::Clock;
 
 use ash::vk;
 use thiserror::Error;
@@ -51,8 +52,7 @@ pub(crate) struct Vulkan {
     /// The driver's pipeline cache, which locks itself.
     cache: vk::PipelineCache,
     exports: Exports,
-    /// Duration of a tick of time stamps [s].
-    tick_s: f64,
+    clock: Clock,
     driver: String,
 }
 
@@ -167,6 +167,7 @@ unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) 
         }
         instance.get_physical_device_properties2(physical, &mut all);
         let known = all.properties;
+        let families = instance.get_physical_device_queue_family_properties(physical);
         Vulkan {
             host: imports.then(|| ash::ext::external_memory_host::Device::new(&instance, &raw)),
             exports: Exports::of(&instance, physical, &raw, hal.enabled_device_extensions()),
@@ -174,7 +175,10 @@ unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) 
             trusts_pipelines,
             heaps: instance.get_physical_device_memory_properties(physical),
             family: hal.queue_family_index(),
-            tick_s: f64::from(known.limits.timestamp_period) * 1e-9,
+            clock: Clock {
+                tick_s: f64::from(known.limits.timestamp_period) * 1e-9,
+                bits: families[hal.queue_family_index() as usize].timestamp_valid_bits,
+            },
             cache: vk::PipelineCache::null(),
             driver: format!(
                 "{}-{:08x}",

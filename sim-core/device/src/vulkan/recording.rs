@@ -30,7 +30,7 @@ impl Vulkan {
             pool: vk::CommandPool::null(),
             descriptors: vk::DescriptorPool::null(),
             stamps: match is_timed {
-                true => Stamps::new(device, ops.len())?,
+                true => Stamps::new(device, self.clock, ops.len())?,
                 false => None,
             },
             device: device.clone(),
@@ -176,7 +176,15 @@ impl Vulkan {
     /// What the commands took in the last run [s]; empty where they are not timed or have not run.
     pub fn seconds(&self, recording: &Recording) -> Vec<f64> {
         let stamps = recording.stamps.as_ref();
-        stamps.map_or_else(Vec::new, |stamps| stamps.seconds(self.tick_s))
+        stamps.map_or_else(Vec::new, Stamps::seconds)
+    }
+
+    /// A run of a recording is done.
+    #[expect(clippy::unused_self, reason = "as `seconds`, which asks for one")]
+    pub fn done(&self, recording: &Recording) {
+        if let Some(stamps) = &recording.stamps {
+            stamps.written();
+        }
     }
 
     /// Puts recordings into an encoder of wgpu, which holds nothing else; what they write is seen by all that follows, the host too.

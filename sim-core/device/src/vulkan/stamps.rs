@@ -1,18 +1,35 @@
 //! Time stamps of the commands of a recording.
 
 use ash::vk;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A stamp before the first command, and one after each.
 pub(super) struct Stamps {
     pool: vk::QueryPool,
     count: u32,
+    clock: Clock,
+    /// Whether a run has written them.
+    is_written: AtomicBool,
     device: ash::Device,
 }
 
+/// The clock of a queue.
+#[derive(Clone, Copy)]
+pub(super) struct Clock {
+    /// Duration of a tick [s].
+    pub tick_s: f64,
+    /// Bits of a stamp that count; none where the queue has no clock.
+    pub bits: u32,
+}
+
 impl Stamps {
-    /// Stamps for so many commands; `None` where there is no command.
-    pub fn new(device: &ash::Device, commands: usize) -> Result<Option<Stamps>, vk::Result> {
-        if commands == 0 {
+    /// Stamps for so many commands; `None` where there is no command or no clock.
+    pub fn new(
+        device: &ash::Device,
+        clock: Clock,
+        commands: usize,
+    ) -> Result<Option<Stamps>, vk::Result> {
+        if commands == 0 || clock.bits == 0 {
             return Ok(None);
         }
         let count = commands as u32 + 1;
@@ -25,6 +42,8 @@ impl Stamps {
         Ok(Some(Stamps {
             pool,
             count,
+            clock,
+            is_written: AtomicBool::new(false),
             device,
         }))
     }
@@ -60,11 +79,19 @@ impl Stamps {
         }
     }
 
+    /// A run is done.
+    pub fn written(&self) {
+        self.is_written.store(true, Ordering::Relaxed);
+    }
+
     /// From stamp to stamp [s]; empty before the first run.
-    pub fn seconds(&self, tick_s: f64) -> Vec<f64> {
+    pub fn seconds(&self) -> Vec<f64> {
+        if !self.is_written.load(Ordering::Relaxed) {
+            return Vec::new();
+        }
         let mut ticks = vec![0u64; self.count as usize];
         let flags = vk::QueryResultFlags::TYPE_64;
-        // SAFETY: the pool has these numbers, and no run is under way: runs are waited for.
+        // SAFETY: the pool has these numbers, a run has reset and written them, and none is under way: runs are waited for.
         let read = unsafe {
             self.device
                 .get_query_pool_results(self.pool, 0, &mut ticks, flags)
@@ -72,9 +99,10 @@ impl Stamps {
         if read.is_err() {
             return Vec::new();
         }
+        let counted = u64::MAX >> (64 - self.clock.bits.min(64));
         let pairs = ticks.windows(2);
         pairs
-            .map(|pair| pair[1].wrapping_sub(pair[0]) as f64 * tick_s)
+            .map(|pair| (pair[1].wrapping_sub(pair[0]) & counted) as f64 * self.clock.tick_s)
             .collect()
     }
 }

@@ -128,3 +128,34 @@ fn first_bad<T: Copy>(values: &[T], is_good: impl Fn(T) -> bool) -> Option<usize
     let place = values[from..].iter().position(|&x| !is_good(x));
     place.map(|place| from + place)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_value_that_is_not_finite_is_found_wherever_it_is() {
+        for bad in [0, 63, 64, 65, 127, 128, 199] {
+            for first in [0, 1, 64] {
+                let mut singles = vec![1.0_f32; 264];
+                let mut doubles = vec![1.0_f64; 264];
+                (singles[first + bad], doubles[first + bad]) = (f32::NAN, 1e300);
+                // one behind it does not matter
+                (singles[263], doubles[263]) = (f32::INFINITY, f64::NAN);
+                let part = first..first + 200;
+                let found = Some(first + bad);
+                let of_singles = Values::F32(&singles);
+                assert_eq!(
+                    of_singles.first_not_finite(part.clone(), Precision::F32),
+                    found
+                );
+                let of_doubles = Values::F64(&doubles);
+                assert_eq!(
+                    of_doubles.first_not_finite(part.clone(), Precision::F32),
+                    found
+                );
+                assert_eq!(of_doubles.first_not_finite(part, Precision::F64), None);
+            }
+        }
+    }
+}

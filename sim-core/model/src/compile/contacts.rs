@@ -8,8 +8,9 @@ use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
 use sim_physics::constants::contact::{
-    Class, Column, Contacts, FrictionCombine, Group, Pair, Run, pair, row,
+    Class, Column, Contacts, FrictionCombine, Pair, Run, pair, row,
 };
+use sim_physics::constants::pair_groups::Group;
 use sim_physics::constants::{Constants, Coupled, Impedance};
 use sim_physics::lane::Fixed;
 use sim_physics::math::factor::Pattern;

@@ -3,10 +3,10 @@
 use super::clip::Cut;
 use super::height_field::FieldTables;
 use super::hull::HullTables;
+use super::pair_groups::Group;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
 use std::fmt;
-use std::ops::Range;
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -142,7 +142,7 @@ pub struct Handles {
     pub pair_indices: Fixed,
     /// First row and capacity of a class.
     pub class_rows: Fixed,
-    /// Blocks of pairs of the same kinds: each has [`BLOCK`] pairs, the last one as often as it takes, and the pair after its last.
+    /// Blocks of pairs of the same kinds: each has [`super::pair_groups::BLOCK`] pairs, the last one as often as it takes, and the pair after its last.
     /// Without rows where pairs are tested one by one.
     pub pair_blocks: Fixed,
 }
@@ -157,9 +157,6 @@ impl fmt::Debug for Handles {
             .finish()
     }
 }
-
-/// Pairs of a block.
-pub const BLOCK: usize = 8;
 
 /// Scratch tables.
 #[derive(Clone, Copy, Debug)]
@@ -203,17 +200,6 @@ recast! {
         /// Its centre in the body's frame, or in the world [m].
         pub center: [R; 3],
     }
-}
-
-/// Pairs of two kinds of shapes.
-#[derive(Clone, Copy, Debug)]
-pub struct Group {
-    /// The lower kind first.
-    pub kinds: (Kind, Kind),
-    /// Its first pair.
-    pub first: usize,
-    /// The pair after its last.
-    pub end: usize,
 }
 
 /// A pair for output: places of its shapes in the model's list of shape names. The normal points from the first to the second.
@@ -430,31 +416,6 @@ pub const COUNT_ROWS: usize = 1;
 pub const COUNT_LEFT_OUT: usize = 2;
 /// Rows of `counts` after the classes.
 pub const COUNTS: usize = 3;
-
-impl<R> Contacts<R> {
-    /// The pairs of two kinds.
-    #[inline(always)]
-    pub fn group(&self, kinds: (Kind, Kind)) -> Option<&Group> {
-        self.groups.iter().find(|group| group.kinds == kinds)
-    }
-
-    /// The blocks of a group, as rows of `pair_blocks`; empty where its pairs are tested one by one.
-    pub fn blocks(&self, kinds: (Kind, Kind)) -> Range<usize> {
-        let before = self.groups.iter().take_while(|group| group.kinds != kinds);
-        let first = before.map(Group::blocks).sum();
-        first..first + self.group(kinds).map_or(0, Group::blocks)
-    }
-}
-
-impl Group {
-    /// How many blocks its pairs make: none of a few pairs, where a block costs more than it saves.
-    pub fn blocks(&self) -> usize {
-        match self.end - self.first {
-            ..=BLOCK => 0,
-            pairs => pairs.div_ceil(BLOCK),
-        }
-    }
-}
 
 impl<R> Contacts<R> {
     /// Bounds of the first rows and of the capacities of classes: for backends that check the indices of `class_rows`.

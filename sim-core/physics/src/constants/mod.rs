@@ -7,6 +7,7 @@ pub mod height_field;
 pub mod hull;
 pub mod mujoco;
 pub mod mujoco_frames;
+pub mod pair_groups;
 pub mod params;
 mod recast;
 pub mod scan;

@@ -20,8 +20,7 @@ use crate::random::Numbering;
 use crate::start::StartDraw;
 use sim_device::{AdapterInfo, Choice, Device, Replay};
 use sim_model::Model;
-use sim_physics::arrays::Array;
-use sim_physics::arrays::Layout;
+use sim_physics::arrays::{Array, Layout};
 use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
 use sim_record::split::{Limits, Prices};
@@ -38,6 +37,9 @@ pub(super) const HARDWARE: Limits = Limits {
     dispatch: 1_500,
     prices: Prices::HARDWARE,
 };
+
+/// Frames begin at a multiple of this in the memory of their readers, as sim-protocol lays it out [bytes].
+const ARENA_ALIGN: u64 = 64;
 
 /// Where the kernels of a GPU are cut; none = what suits the adapter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -174,9 +176,10 @@ impl Gpu {
         let mut compiled = Compiled::new(&device, m, &places, &programs, outputs, widest, limit)?;
         compiled.replay = asked.replay;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
-        // whole lines cross the bus best as they are written (measured on an H100: a tenth less per frame than a copy); contacts are
-        // written here and there
-        let is_apart = scatters && has_own_memory(&device);
+        // whole lines cross the bus best as they are written; contacts are written here and there. Arenas begin at a multiple of
+        // `ARENA_ALIGN`, where a program can write only if the adapter binds buffers there
+        let is_bound = device.info().binding_align <= ARENA_ALIGN;
+        let is_apart = has_own_memory(&device) && (scatters || !is_bound);
         let drawn = is_apart.then(|| device.buffer("frame", layout.bytes.max(64) as u64));
         let drawn = drawn.transpose()?;
         let bounds = Bounds::new(&device)?;

@@ -21,7 +21,8 @@
 //! # A frame
 //! A frame of a tile is recorded once: waiting commands, substeps, fault checks, evaluation, then a batch that writes the output. Where
 //! the driver imports host memory, the output goes into the memory of its readers (`imported`). Otherwise the processor copies it once
-//! from a staging buffer, and counts the bytes. Programs write to host memory at once, but for contacts: these are drawn in device memory.
+//! from a staging buffer, and counts the bytes. Programs write to host memory
+//! at once; a frame with contacts is drawn in device memory first.
 //!
 //! # The host's part
 //! The host mirrors seeds, episodes, parameters and counters (`mirror`). It draws starts and noise by the functions of the CPU backend
@@ -33,8 +34,9 @@
 //! CPU where a GPU does not start, and the daemon's notes say why.
 //!
 //! # What is measured
-//! On an H100 with driver 580, at 4096 worlds of the grasp and of a quadruped on the ground: eight threads per world beat 1, 4, 16 and 32.
-//! Kernels of 12,000 statements instead of 6,000 gain 8 % in the grasp and lose 4 % in the other. Other cards were not measured.
+//! On an H100 (`benches/results`, `gpu_cuts.csv`), with 4096 worlds: eight threads per world take 1 % less of a frame than four in the
+//! grasp and 11 % less for a quadruped on the ground. Kernels of 12,000 statements instead of 6,000 take 8 % less in the grasp and 4 %
+//! more in the other. Other cards were not measured.
 
 mod backend;
 mod blocks;

@@ -51,7 +51,7 @@ pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize
     joints.into_iter().chain(models).chain(loads)
 }
 
-/// Whether programs reach host memory only over a bus: they then read and write copies in the adapter's memory.
+/// Whether programs reach host memory only over a bus: they then read copies in the adapter's memory.
 pub(super) fn has_own_memory(device: &Device) -> bool {
     device.info().kind == AdapterKind::Discrete
 }

@@ -53,8 +53,9 @@ use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{
-    BLOCK, COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
 };
+use crate::constants::pair_groups::BLOCK;
 use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
