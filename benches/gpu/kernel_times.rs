@@ -2,6 +2,7 @@
 
 use crate::measure::wake;
 use crate::scenes::{Plan, WorldSet};
+use anyhow::Context;
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
 use std::fs::OpenOptions;
@@ -16,12 +17,7 @@ const WARM_UP: usize = 5;
 type Times = (String, usize, Vec<f64>);
 
 /// Runs a plan once and prints the programs in the order of their first dispatch; rows go to the file too.
-pub fn print(
-    sim: &mut Simulation,
-    plan: &Plan,
-    worlds: usize,
-    csv: Option<&Path>,
-) -> anyhow::Result<()> {
+pub fn print(sim: &mut Simulation, plan: &Plan, worlds: usize, csv: &Path) -> anyhow::Result<()> {
     let mut words = vec![0; sim.layout().bytes / 8];
     let crowd = WorldSet::all(worlds);
     let commands = plan.commands(&crowd);
@@ -41,12 +37,13 @@ pub fn print(
             host[1] += (done - commanded).as_secs_f64();
         }
     }
-    let mut file = csv
-        .map(|path| OpenOptions::new().append(true).create(true).open(path))
-        .transpose()?;
-    if let Some(file) = &mut file
-        && file.metadata()?.len() == 0
-    {
+    anyhow::ensure!(
+        !programs.is_empty(),
+        "this adapter has no time stamps: --kernel-times needs Vulkan and a queue with a clock"
+    );
+    let file = OpenOptions::new().append(true).create(true).open(csv);
+    let mut file = file.with_context(|| csv.display().to_string())?;
+    if file.metadata()?.len() == 0 {
         writeln!(
             file,
             "scene,worlds,program,dispatches,mean_us,p50_us,max_us"
@@ -65,12 +62,10 @@ pub fn print(
         let [p50, max] = [times[times.len() / 2], times[times.len() - 1]].map(|x| 1e6 * x);
         whole += mean;
         println!("{label:<24} {dispatches:>10} {mean:>10.1} {p50:>10.1} {max:>10.1}");
-        if let Some(file) = &mut file {
-            writeln!(
-                file,
-                "{name},{worlds},{label},{dispatches},{mean:.1},{p50:.1},{max:.1}"
-            )?;
-        }
+        writeln!(
+            file,
+            "{name},{worlds},{label},{dispatches},{mean:.1},{p50:.1},{max:.1}"
+        )?;
     }
     println!("{:<24} {:>10} {whole:>10.1}", "all", "");
     let [command, step] = host.map(|sum| 1e6 * sum / (commands.len() - WARM_UP) as f64);

@@ -151,7 +151,7 @@ fn time_kernels(arguments: &Arguments, place: &Place, csv: &Path) -> anyhow::Res
                 ..options(place, worlds, &FIELDS)
             };
             let (mut sim, _) = build(&plan, &options)?;
-            kernel_times::print(&mut sim, &plan, worlds, Some(csv))?;
+            kernel_times::print(&mut sim, &plan, worlds, csv)?;
         }
     }
     Ok(())
