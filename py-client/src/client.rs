@@ -1,12 +1,12 @@
 //! A client of one daemon, as Python holds it: steps without the interpreter lock, and listens to Ctrl-C meanwhile.
 
 use std::ops::ControlFlow;
-use std::os::fd::{IntoRawFd, RawFd};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use sim_protocol::device_memory::into_number;
 use sim_protocol::{
     AttachOptions, Client as Connection, Description, Hook, OnDevice, ProtocolError,
 };
@@ -52,11 +52,11 @@ impl Client {
     }
 
     /// Device memory of the daemon as JSON, and its file descriptors, which are the caller's to close.
-    fn device_memory(&self, py: Python<'_>) -> PyResult<(String, Vec<RawFd>)> {
+    fn device_memory(&self, py: Python<'_>) -> PyResult<(String, Vec<i32>)> {
         let connection = self.connection(py)?;
         let (memory, descriptors) = self.waiting(py, |hook| connection.device_memory(hook))?;
         let memory = serde_json::to_string(&memory).expect("it is plain data");
-        let descriptors = descriptors.into_iter().map(IntoRawFd::into_raw_fd);
+        let descriptors = descriptors.into_iter().map(into_number);
         Ok((memory, descriptors.collect()))
     }
 

@@ -2,10 +2,9 @@
 
 use std::ffi::OsString;
 use std::io::Write;
-use std::sync::Arc;
 
-use signal_hook::consts::SIGXFSZ;
 use sim_protocol::{AttachOptions, Client, keep_waiting};
+use sim_system::signals;
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
@@ -17,8 +16,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Ok(command) => command,
         Err(code) => return code,
     };
-    // a file that may not grow is an error to report, no reason to be killed
-    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
+    signals::survive_full_files();
     let result = match &command {
         CliCommand::Serve(serve) => session::run(serve),
         CliCommand::Inspect(args) => inspect::run(args),

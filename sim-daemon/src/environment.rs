@@ -7,6 +7,7 @@
 use std::path::Path;
 
 use sim_protocol::paths::{RUNTIME_FOLDER, stand_in_runtime_folder};
+use sim_system::process;
 
 /// The variable that is missing and its value; `None` if nothing is.
 pub fn missing() -> Option<(&'static str, &'static Path)> {
@@ -15,7 +16,7 @@ pub fn missing() -> Option<(&'static str, &'static Path)> {
 
 /// Completes the environment. Call it first in `main`: it leaves a process with several threads as it is.
 pub fn complete() {
-    if threads() != Some(1) {
+    if process::threads() != Some(1) {
         return;
     }
     if let Some((name, value)) = missing() {
@@ -24,12 +25,7 @@ pub fn complete() {
     }
 }
 
-/// Threads of this process, where the system tells.
-fn threads() -> Option<usize> {
-    Some(std::fs::read_dir("/proc/self/task").ok()?.count())
-}
-
-#[cfg(test)]
+#[cfg(all(test, target_os = "linux"))]
 mod tests {
     use super::*;
 
@@ -39,7 +35,7 @@ mod tests {
         std::thread::scope(|scope| {
             let (done, wait) = std::sync::mpsc::channel::<()>();
             scope.spawn(move || wait.recv());
-            assert!(threads() > Some(1));
+            assert!(process::threads() > Some(1));
             complete();
             drop(done);
         });

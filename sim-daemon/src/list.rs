@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use sim_protocol::{AttachOptions, Client, ProtocolError};
+use sim_system::process;
 
 use crate::error::DaemonError;
 use crate::output;
@@ -124,25 +125,8 @@ fn ask(name: &str) -> Result<Option<News>, ProtocolError> {
         controllers,
         observers,
         rate,
-        age: age(description.pid),
+        age: process::age(description.pid),
     }))
-}
-
-/// How long a process has run, as far as this process sees it.
-pub(crate) fn age(pid: u32) -> Option<Duration> {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    let uptime = std::fs::read_to_string("/proc/uptime").ok()?;
-    // the name before may have spaces; its start is the 22nd field
-    let started: f64 = stat
-        .rsplit_once(')')?
-        .1
-        .split_whitespace()
-        .nth(19)?
-        .parse()
-        .ok()?;
-    let now: f64 = uptime.split_whitespace().next()?.parse().ok()?;
-    let ticks = rustix::param::clock_ticks_per_second() as f64;
-    Duration::try_from_secs_f64(now - started / ticks).ok()
 }
 
 impl Row {

@@ -3,8 +3,9 @@
 //! A thread of their own writes them all ([`Printer`]): a step never waits for a reader.
 
 use std::fs::OpenOptions;
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
+
+use sim_system::files::make_private;
 
 use crate::error::DaemonError;
 use crate::output;
@@ -67,7 +68,7 @@ impl Log {
             None => (Some(stderr.clone()), "tightloop: "),
             Some(path) => {
                 let mut options = OpenOptions::new();
-                options.append(true).create(true).mode(0o600);
+                make_private(options.append(true).create(true));
                 let file = output::open(path, &mut options).map_err(|error| DaemonError::Log {
                     path: path.to_owned(),
                     problem: error.to_string(),

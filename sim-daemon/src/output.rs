@@ -3,10 +3,9 @@
 use std::fs::{self, File, OpenOptions};
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{self, ErrorKind, Write};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+pub(crate) use sim_system::files::open_to_write as open;
 
 /// Writes a file beside its place and renames it, so that a full disk leaves what was there before.
 ///
@@ -42,18 +41,6 @@ pub(crate) fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".tightloop-{number:016x}"))
 }
 
-/// Opens what is written piece by piece; a pipe without a reader is an error, and not waited for.
-///
-/// # Errors
-/// What the system says.
-pub(crate) fn open(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
-    let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
-    let file = options.custom_flags(flags.bits() as i32).open(path)?;
-    // writes to a slow reader do wait
-    fcntl_setfl(&file, fcntl_getfl(&file)? - OFlags::NONBLOCK)?;
-    Ok(file)
-}
-
 /// Prints a result. Whoever reads it may stop reading.
 ///
 /// # Errors
@@ -66,7 +53,7 @@ pub(crate) fn print(text: &[u8]) -> io::Result<()> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::os::unix::fs::{PermissionsExt, symlink};
 

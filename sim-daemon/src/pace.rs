@@ -2,13 +2,8 @@
 
 use std::time::Duration;
 
-use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::thread::{CpuSet, sched_setaffinity};
 use sim_protocol::{Late, Pace};
-use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy,
-    set_thread_priority_and_policy, thread_native_id,
-};
+use sim_system::{cores, memory, signals};
 
 use crate::cli::Serve;
 use crate::error::DaemonError;
@@ -68,33 +63,18 @@ pub(crate) fn pace(serve: &Serve, frame: f64) -> Result<Option<Pace>, DaemonErro
 pub(crate) fn ask_system(serve: &Serve) -> Result<Vec<String>, DaemonError> {
     let mut notes = Vec::new();
     if !serve.cores.is_empty() {
-        let mut cores = CpuSet::new();
-        for &core in &serve.cores {
-            if core >= CpuSet::MAX_CPU {
-                let problem = format!("numbers end at {}", CpuSet::MAX_CPU - 1);
-                return Err(wrong("cores", &core, problem));
-            }
-            cores.set(core);
-        }
-        if let Err(error) = sched_setaffinity(None, &cores) {
-            let problem = format!("{error}; /proc/cpuinfo lists the processors");
+        cores::keep_to(&serve.cores).map_err(|problem| {
             let given: Vec<String> = serve.cores.iter().map(usize::to_string).collect();
-            return Err(wrong("cores", &given.join(","), problem));
-        }
+            wrong("cores", &given.join(","), problem)
+        })?;
     }
     if let Some(priority) = serve.priority {
         let Some(value) = Some(priority).filter(|priority| PRIORITIES.contains(priority)) else {
             let problem = "give 1 to 99; 99 is the most urgent".to_owned();
             return Err(wrong("priority", &priority, problem));
         };
-        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let priority = ThreadPriority::Crossplatform(value.try_into().expect("it is below 100"));
-        let set = set_thread_priority_and_policy(thread_native_id(), priority, policy);
-        if let Err(error) = set {
-            notes.push(format!(
-                "priority {value} was not granted ({error:?}): run as root, or allow `rtprio {value}` in \
-                 /etc/security/limits.conf"
-            ));
+        if let Err(problem) = signals::set_priority(value) {
+            notes.push(format!("priority {value} was not granted {problem}"));
         }
     }
     Ok(notes)
@@ -105,10 +85,8 @@ pub(crate) fn lock_memory(serve: &Serve) -> Option<String> {
     if !serve.lock_memory {
         return None;
     }
-    let error = mlockall(MlockAllFlags::CURRENT).err()?;
-    Some(format!(
-        "memory was not locked ({error}): run as root, or raise `memlock` in /etc/security/limits.conf"
-    ))
+    let problem = memory::lock().err()?;
+    Some(format!("memory was not locked {problem}"))
 }
 
 fn wrong(argument: &'static str, value: &dyn ToString, problem: String) -> DaemonError {

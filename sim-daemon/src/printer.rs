@@ -4,14 +4,14 @@
 //! full, messages are dropped, and their number is written once somebody reads again.
 
 use std::fs::File;
+use std::io;
 use std::io::Write;
-use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError, channel};
 use std::time::{Duration, Instant};
 
-use nix::sys::signal::{SigSet, Signal};
+use sim_system::{signals, streams};
 
 use crate::error::DaemonError;
 
@@ -39,21 +39,19 @@ pub(crate) struct Printer {
 impl Printer {
     /// Starts a thread that writes to stdout.
     pub(crate) fn stdout() -> Result<Printer, DaemonError> {
-        Printer::of_stream(std::io::stdout())
+        Printer::of_stream(streams::stdout())
     }
 
     /// Starts a thread that writes to stderr.
     pub(crate) fn stderr() -> Result<Printer, DaemonError> {
-        Printer::of_stream(std::io::stderr())
+        Printer::of_stream(streams::stderr())
     }
 
-    /// Writes past the lock of the standard streams, which others would wait for.
-    fn of_stream(stream: impl AsFd) -> Result<Printer, DaemonError> {
-        let own = stream.as_fd().try_clone_to_owned();
-        match own {
-            Ok(own) => Printer::start(File::from(own)),
+    fn of_stream(stream: io::Result<File>) -> Result<Printer, DaemonError> {
+        match stream {
+            Ok(stream) => Printer::start(stream),
             // a stream that was closed: nobody reads it
-            Err(_) => Printer::start(std::io::sink()),
+            Err(_) => Printer::start(io::sink()),
         }
     }
 
@@ -65,7 +63,7 @@ impl Printer {
         std::thread::Builder::new()
             .name("tightloop-printer".to_owned())
             .spawn(move || {
-                keep_writing_in_the_background();
+                signals::keep_writing_in_the_background();
                 print(target, &items, &theirs);
             })
             .map_err(|error| DaemonError::System {
@@ -95,13 +93,6 @@ impl Printer {
         // what is not written by then is lost
         let _ = written.recv_timeout(deadline.saturating_duration_since(Instant::now()));
     }
-}
-
-/// Lets this thread write to a terminal whose foreground is another job. Under `stty tostop` the terminal stops whole
-/// processes that write from the background, unless the writer blocks the signal.
-fn keep_writing_in_the_background() {
-    // a thread that keeps its mask is no worse than before
-    let _ = SigSet::from(Signal::SIGTTOU).thread_block();
 }
 
 /// Waits until everything handed over is written, or until that takes too long.

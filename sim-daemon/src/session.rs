@@ -16,6 +16,7 @@ use sim_protocol::descriptors::make_room_for;
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{Description, ProtocolError, Table};
+use sim_system::signals;
 
 use crate::advice::advice;
 use crate::cli::Serve;
@@ -61,18 +62,10 @@ fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<()
     )?;
     // from here on, a request to stop is carried out as soon as that is clean
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [
-        signal_hook::consts::SIGTERM,
-        signal_hook::consts::SIGINT,
-        signal_hook::consts::SIGHUP,
-    ] {
-        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|error| {
-            DaemonError::System {
-                action: "handle signals",
-                problem: error.to_string(),
-            }
-        })?;
-    }
+    signals::on_stop(&stop).map_err(|error| DaemonError::System {
+        action: "handle signals",
+        problem: error.to_string(),
+    })?;
     let Opened { daemon, groups } = open(serve)?;
     let door = Mutex::new(Door {
         daemon,

@@ -2,13 +2,14 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
-use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use sim_engine::simulation::Simulation;
 use sim_model::files::{self, FileError};
 use sim_protocol::RefusalKind;
 use sim_protocol::host::{Inbox, free_memory};
+use sim_system::files::is_nameless;
+use sim_system::process;
 
 use crate::output;
 use crate::refusal::{Refusal, refusal};
@@ -52,12 +53,12 @@ pub(crate) fn save(simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal
 ///
 /// A process that gave up waiting may have another file at that number by now: one that holds something, or has a name.
 fn nameless(path: &Path) -> Option<File> {
-    if !path.starts_with("/proc") || !fs::metadata(path).ok()?.is_file() {
+    if !process::is_open_file_of_another(path) || !fs::metadata(path).ok()?.is_file() {
         return None;
     }
     let file = OpenOptions::new().write(true).open(path).ok()?;
     let status = file.metadata().ok()?;
-    (status.is_file() && status.nlink() == 0 && status.len() == 0).then_some(file)
+    (status.is_file() && is_nameless(&status) && status.len() == 0).then_some(file)
 }
 
 /// Sets the worlds of the mask to those of the file that the command names, or to one of them.

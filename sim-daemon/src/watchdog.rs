@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use sim_protocol::host::ClientCleanup;
+use sim_system::process;
 
 use crate::error::DaemonError;
 
@@ -35,7 +36,7 @@ impl Watchdog {
             let mut cleaned = Instant::now();
             let mut guard = ended.lock().unwrap_or_else(PoisonError::into_inner);
             while !*guard {
-                if parent.is_some_and(|parent| std::os::unix::process::parent_id() != parent) {
+                if parent.is_some_and(process::is_orphan) {
                     stop.store(true, Ordering::Relaxed);
                 }
                 if cleaned.elapsed() >= CLEAN_PERIOD {

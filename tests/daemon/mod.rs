@@ -180,7 +180,7 @@ pub fn unique(name: &str) -> String {
 /// Files of a name: its lock, and what begins with its stem in shared memory.
 pub fn leftovers(name: &str) -> Vec<String> {
     let daemon = paths::DaemonPaths::new(None, name).unwrap();
-    let mut found: Vec<String> = std::fs::read_dir(paths::SHARED_MEMORY)
+    let mut found: Vec<String> = std::fs::read_dir(paths::shared_memory())
         .unwrap()
         .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
         .filter(|file| file.starts_with(daemon.stem()))

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use sim_protocol::paths::{DaemonPaths, SHARED_MEMORY};
+use sim_protocol::paths::{DaemonPaths, shared_memory};
 use sim_protocol::{Client, DeviceMemory, Frame, OnDevice, ProtocolError, keep_waiting};
 
 use crate::daemon::Daemon;
@@ -225,7 +225,7 @@ fn visitors_that_say_nothing_or_nonsense_or_leave_disturb_nobody() {
     reset(&client);
     let session = client.description().session;
     let paths = DaemonPaths::new(None, &daemon.name).unwrap();
-    let socket = format!("{SHARED_MEMORY}/{}/{session:016x}.socket", paths.stem());
+    let socket = format!("{}/{}/{session:016x}.socket", shared_memory(), paths.stem());
     let silent: Vec<_> = (0..8)
         .map(|_| UnixStream::connect(&socket).unwrap())
         .collect();

@@ -42,6 +42,7 @@ LAYERS = (
         "tightloop.optional_imports",
         "tightloop.rotations",
         "tightloop.signatures",
+        "tightloop.system",
         "tightloop.whole_files",
         "tightloop.written_arrays",
     ),

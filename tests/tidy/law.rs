@@ -243,7 +243,6 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "park",
             "waiter",
             "command",
-            "cgroup",
             "memory",
             "loaned",
             "frame",
@@ -255,6 +254,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "host",
         ],
     ),
+    ("sim-daemon/system/src", &["portable", "unix", "system"]),
     (
         "sim-daemon/client-c/src",
         &[
@@ -349,7 +349,7 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 40] = [
+pub const UNSAFE: [&str; 47] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -380,14 +380,21 @@ pub const UNSAFE: [&str; 40] = [
     "sim-daemon/client-c/src/frame.rs", // as calls.rs
     "sim-daemon/client-c/src/timing.rs", // as calls.rs
     "sim-daemon/client-c/src/pointers.rs", // what C passes: texts, arrays, places of results
-    "sim-daemon/protocol/src/forked.rs", // a handler of forks
     "sim-daemon/protocol/src/frame.rs", // views of a sample
     "sim-daemon/protocol/src/park.rs",  // the descriptor of a listener
     "sim-daemon/protocol/src/loaned.rs", // loaned samples
-    "sim-daemon/protocol/src/mapping.rs", // mapped files, and those that somebody cuts
+    "sim-daemon/protocol/src/mapping.rs", // tests that read mapped files
     "sim-daemon/protocol/src/port.rs",  // ports that are dropped or left alone
     "sim-daemon/protocol/src/reentrant.rs", // a value that a lock abandons
     "sim-daemon/protocol/src/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
     "sim-daemon/src/server.rs",         // samples that a device writes to
+    "sim-daemon/system/src/unix/faults.rs", // a handler of missing pages
+    "sim-daemon/system/src/unix/files.rs", // the descriptor of a listener
+    "sim-daemon/system/src/unix/forks.rs", // a handler of forks
+    "sim-daemon/system/src/windows/clock.rs", // calls of Windows
+    "sim-daemon/system/src/windows/cores.rs", // as clock.rs
+    "sim-daemon/system/src/windows/files.rs", // as clock.rs
+    "sim-daemon/system/src/windows/process.rs", // as clock.rs
+    "sim-daemon/system/src/windows/storage.rs", // as clock.rs
 ];

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from tightloop import system
 from tightloop.array_libraries import ArrayLibrary, Torch, array_library, check_array, gpu_of
 from tightloop.cuda import Import, driver
 from tightloop.errors import CommandRefused, GpuMemoryError
@@ -208,10 +209,15 @@ class KeepsOnGpu:
             with the reason why each step waits for the stream.
 
         Raises:
-            GpuMemoryError: The worlds are on the CPU, the driver exports no memory, or CUDA does not see that GPU.
+            GpuMemoryError: The worlds are on the CPU, the driver exports no memory, CUDA does not see that GPU, or the
+                system is not Linux.
             MissingLibrary: ``cuda-bindings``, or both torch and CuPy, are not installed.
             LeaseHeld: Another client controls the daemon. Other errors are those of `step`.
         """
+        if not system.shares_gpu_memory():
+            raise GpuMemoryError(
+                "keep_on_gpu: processes share GPU memory on Linux only; read frames as NumPy arrays, or run on Linux"
+            )
         info, client = self.info, self._client  # type: ignore[attr-defined]
         if not info["adapter"]:
             raise GpuMemoryError('keep_on_gpu: the worlds are on the CPU; launch with device="gpu"')

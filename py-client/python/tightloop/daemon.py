@@ -5,13 +5,12 @@ from __future__ import annotations
 import errno
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-from tightloop import _core, errors
+from tightloop import _core, errors, system
 from tightloop.errors import LaunchError
 
 _PROGRAM = Path(__file__).with_name("__main__.py")
@@ -49,13 +48,11 @@ class Daemon:
             raise LaunchError("this Python does not know its own executable; start `tightloop serve` and attach")
         flags = [f"--{flag}" if value is True else f"--{flag}={value}" for flag, value in arguments.items()]
         try:
-            process = subprocess.Popen(
+            # Ctrl-C in a terminal goes to the caller, which decides whether the daemon stops
+            process = system.start_apart(
                 # without site packages and environment variables: the daemon needs only this package, and starts faster
                 [sys.executable, "-I", "-S", str(_PROGRAM), "serve", "-", f"--parent={os.getpid()}", *flags],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                # Ctrl-C in a terminal goes to the caller, which decides whether the daemon stops
-                start_new_session=True,
             )
         except OSError as error:
             cure = _CURES.get(error.errno or 0, "let this user run that file")
@@ -76,8 +73,10 @@ class Daemon:
         try:
             with self.process.stdin as stdin:
                 stdin.write(scene.encode())
-        except BrokenPipeError:
-            pass  # the daemon ended before it read the scene; its answer has the reason
+        except OSError as problem:
+            # where the daemon ended before it read the scene, its answer has the reason
+            if not system.is_broken_pipe(problem):
+                raise
         # a driver may print lines of its own before the daemon's only one
         answer = next(filter(None, map(_answer, self.process.stdout)), None)
         if answer is None:
@@ -103,9 +102,9 @@ class Daemon:
         """Stop the daemon, kill it if it does not stop, and remove the files of a killed one."""
         process = self.process
         try:
-            process.terminate()
+            system.ask_to_end(process)
             # a stopped one ends only when it continues
-            process.send_signal(signal.SIGCONT)
+            system.resume(process)
             process.wait(_STOP_SECONDS)
         except subprocess.TimeoutExpired:
             process.kill()

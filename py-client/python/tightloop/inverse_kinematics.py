@@ -7,14 +7,13 @@ the Levenberg-Marquardt method", IEEE Transactions on Robotics 27, 2011), within
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
+from tightloop import _core, checks, system
 from tightloop.attributes import suggestion
 from tightloop.errors import ArgumentError
 from tightloop.ik_objectives import Posture, Reach, rows, unit_quaternions
@@ -308,5 +307,5 @@ def _is_double(value: Any) -> bool:
 
 def _threads(value: Any, own: int | None) -> int:
     if value is None:
-        return len(os.sched_getaffinity(0)) if own is None else own
+        return system.usable_cores() if own is None else own
     return checks.integer("solve: threads", value, error=ArgumentError)

@@ -318,7 +318,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         """Take a snapshot of all worlds; a run restored from it continues with the same bits.
 
         It holds state, commands, parameters, seed, episode, ``step`` and ``status`` of every world. It passes through
-        a file in shared memory.
+        a file in shared memory, or in the temporary folder on macOS and Windows.
 
         Raises:
             SnapshotError: There is not enough memory for it. Other errors are those of `step`.

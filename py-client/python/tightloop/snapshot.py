@@ -5,11 +5,10 @@ A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/sr
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import os
 import stat
 import struct
-import tempfile
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import checks
+from tightloop import checks, system
 from tightloop.errors import SnapshotError
 from tightloop.signatures import checked_calls
 from tightloop.whole_files import whole_file
@@ -31,8 +30,6 @@ _MAGIC, _VERSION = b"tlsnap\r\n", 1
 _CHECKSUM, _COVERED, _COUNTERS = 12, 16, 28
 # largest file that is read: a million worlds of the largest robots have less
 _BYTES_MAX = 1 << 36
-_SHARED_MEMORY = Path("/dev/shm")
-_NO_ROOM = "snapshot: no room on its way to the daemon: {}; make room in shared memory (`df -h /dev/shm` shows it)"
 
 
 @checked_calls
@@ -168,7 +165,7 @@ class Snapshot:
 def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
     """Provide a file between client and daemon, in shared memory if possible.
 
-    It has no name and ends with this process, unless the daemon is in another container and cannot see this process.
+    How long it lives is told by `tightloop.system.exchange_file`.
 
     Args:
         daemon: Process id of the daemon.
@@ -180,21 +177,11 @@ def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
     Raises:
         SnapshotError: The file cannot be made.
     """
-    folder = _SHARED_MEMORY if _SHARED_MEMORY.is_dir() else None
-    nameless = _is_beside(daemon)
-    kind = tempfile.TemporaryFile if nameless else functools.partial(tempfile.NamedTemporaryFile, prefix="tightloop-")
-    try:
-        file = kind(dir=folder, buffering=0)
-    except OSError as problem:
-        raise SnapshotError(_NO_ROOM.format(problem)) from None
-    with file:
+    with contextlib.ExitStack() as opened:
         try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[file.write(rest) :]
+            path = opened.enter_context(system.exchange_file(daemon, data))
         except OSError as problem:
-            raise SnapshotError(_NO_ROOM.format(problem)) from None
-        path = f"/proc/{os.getpid()}/fd/{file.fileno()}" if nameless else str(file.name)
+            raise _no_room(problem) from None
         try:
             yield path
         except SnapshotError as problem:
@@ -202,21 +189,16 @@ def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
             _, found, reason = str(problem).partition(f"{path}: cannot be written: ")
             if not found:
                 raise
-            raise SnapshotError(_NO_ROOM.format(reason)) from None
+            raise _no_room(reason) from None
 
 
-def _is_beside(process: int) -> bool:
-    """Return whether a process knows this one by the same id."""
-    try:
-        return Path("/proc/self/ns/pid").readlink() == Path(f"/proc/{process}/ns/pid").readlink()
-    except OSError:
-        return False
+def _no_room(reason: object) -> SnapshotError:
+    return SnapshotError(f"snapshot: no room on its way to the daemon: {reason}; {system.cure_of_full_exchange()}")
 
 
 def _read(file: Path) -> bytes:
     """Return the bytes of a regular file that begins as a snapshot does, or the beginning of another one."""
-    # a pipe without a writer would be waited for
-    with open(file, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)) as source:
+    with system.open_without_waiting(file) as source:
         found = os.fstat(source.fileno())
         if not stat.S_ISREG(found.st_mode):
             raise SnapshotError(f"{file}: is no file; give the file of a snapshot")

@@ -10,7 +10,7 @@ import weakref
 from collections.abc import Sequence
 from html import escape
 
-from tightloop import checks, errors
+from tightloop import checks, errors, system
 from tightloop.errors import ArgumentError, LaunchError
 from tightloop.signatures import checked_calls
 
@@ -37,7 +37,7 @@ class Viewer:
         command += [f"--allow-host={host}" for host in hosts]
         command += [f"--parent={os.getpid()}", *(["--open"] if open else [])]
         # the viewer shares our stderr; Ctrl-C in a terminal goes to this process, which decides when the viewer ends
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+        process = system.start_apart(command)
         assert process.stdout is not None
         line = process.stdout.readline().decode().strip()
         if not line:
@@ -77,7 +77,7 @@ def _end(process: subprocess.Popen[bytes], owner: int) -> None:
     # a forked child must not end its parent's viewer
     if os.getpid() != owner:
         return
-    process.terminate()
+    system.ask_to_end(process)
     try:
         process.wait(_STOP_SECONDS)
     except subprocess.TimeoutExpired:

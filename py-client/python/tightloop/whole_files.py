@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tightloop import system
 from tightloop.errors import OutputError
 
 _NEW_MODE = 0o666
@@ -60,11 +61,7 @@ class WholeFile:
         """
         with self.writing():
             if durable:
-                opened = os.open(self.part, os.O_RDONLY)
-                try:
-                    os.fsync(opened)
-                finally:
-                    os.close(opened)
+                system.write_to_disk(self.part)
             self.part.replace(self._place)
         self._end.detach()
 

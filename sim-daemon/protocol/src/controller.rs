@@ -6,6 +6,8 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::PortFactory;
+use sim_system::files::shared_memory;
+use sim_system::process;
 
 use crate::affinity::CoreAffinity;
 use crate::command::{Call, command_bytes};
@@ -17,7 +19,7 @@ use crate::frame::{Alive, FrameSample};
 use crate::guard::guarded;
 use crate::heartbeat::HeartbeatThread;
 use crate::hook::Hook;
-use crate::liveness::{Peer, is_gone};
+use crate::liveness::Peer;
 use crate::loaned;
 use crate::port::Port;
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber, Sleeper};
@@ -102,7 +104,7 @@ impl Controller {
             let again = match error {
                 ProtocolError::Transport { .. } => true,
                 ProtocolError::LeaseHeld { pid, .. } => {
-                    is_gone(pid, connection.peer.beacon.pid)
+                    process::is_gone(pid, connection.peer.beacon.pid)
                         || was_abandoned && pid == own && start.elapsed() < ABANDONED_MAX
                 }
                 ProtocolError::Interrupted | ProtocolError::Timeout { .. } => {
@@ -309,7 +311,7 @@ fn ask_for_lease(connection: &Connection, hook: Hook<'_>) -> Result<u64, Protoco
             pid,
         }),
         Response::NoMemory { free, needed } => Err(ProtocolError::SharedMemory {
-            path: crate::paths::SHARED_MEMORY.to_owned(),
+            path: shared_memory().to_owned(),
             free,
             needed,
             what: "the frames of a new lease".to_owned(),

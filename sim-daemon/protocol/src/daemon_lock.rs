@@ -1,15 +1,14 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::Write;
-use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::{FileExt, MetadataExt};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+use sim_system::files::{self, private, shared_memory};
+
 use crate::paths::{
-    DaemonPaths, Presence, SHARED_MEMORY, STARTING, default_root, names_with_lock, private,
-    private_folder,
+    DaemonPaths, Presence, STARTING, default_root, names_with_lock, private_folder,
 };
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
@@ -73,19 +72,15 @@ impl DaemonLock {
             }
             opened => opened.map_err(root_error)?,
         };
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Ok(None),
-            Err(TryLockError::Error(error)) => return Err(root_error(error)),
-            Ok(()) => {}
-        }
         // the file may have been removed between open and lock: then the lock is on nothing
-        let ours = file.metadata().map_err(root_error)?.ino();
-        if !fs::metadata(&path).is_ok_and(|there| there.ino() == ours) {
+        if !files::try_lock(&file).map_err(root_error)?
+            || !files::is_at(&file, &path).map_err(root_error)?
+        {
             return Ok(None);
         }
         // after a logout, a daemon whose lock file is gone holds only its mark
         let mark = private().open(paths.shared_folder().join(PLACE));
-        if mark.is_ok_and(|mark| mark.try_lock_shared().is_err()) {
+        if mark.is_ok_and(|mark| !files::try_lock_shared(&mark).is_ok_and(|taken| taken)) {
             let _ = fs::remove_file(&path);
             return Ok(None);
         }
@@ -115,8 +110,7 @@ impl DaemonLock {
 
     /// Writes the line that clients read, which is longer than the one before.
     fn say(&mut self, line: &str) -> Result<(), ProtocolError> {
-        self.file
-            .write_all_at(line.as_bytes(), 0)
+        files::write_at(&self.file, line.as_bytes(), 0)
             .map_err(|error| ProtocolError::root(&self.paths.lock_path(), &error))
     }
 
@@ -133,7 +127,7 @@ impl Drop for DaemonLock {
         let _ = fs::remove_file(self.paths.lock_path());
         // our own folder in shared memory goes with the last daemon; any other is the user's
         let root = self.paths.root();
-        if root.starts_with(SHARED_MEMORY) && root == default_root() {
+        if root.starts_with(shared_memory()) && root == default_root() {
             let _ = fs::remove_dir(root);
         }
     }
@@ -169,11 +163,13 @@ fn mark(paths: &DaemonPaths) -> Result<File, ProtocolError> {
     let (new, path) = (folder.join("place.new"), folder.join(PLACE));
     let write = || {
         let mut file = private().create_new(true).open(&new)?;
-        file.write_all(paths.root().as_os_str().as_bytes())?;
+        file.write_all(&files::path_to_bytes(paths.root()))?;
         file.write_all(b"\n")?;
         file.write_all(paths.name().as_bytes())?;
-        file.lock()?;
         // nobody sees it before it is locked
+        if !files::try_lock(&file)? {
+            return Err(std::io::ErrorKind::WouldBlock.into());
+        }
         fs::rename(&new, &path)?;
         Ok(file)
     };
@@ -217,14 +213,14 @@ pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
             drop(DaemonLock::try_take(&paths)?);
         }
     }
-    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+    let Ok(entries) = fs::read_dir(shared_memory()) else {
         return Ok(());
     };
     for folder in entries.flatten() {
-        let is_ours = folder.metadata().is_ok_and(|metadata| {
-            metadata.is_dir() && metadata.uid() == rustix::process::geteuid().as_raw()
-        });
-        if is_ours && folder.file_name().as_bytes().starts_with(b"tl") {
+        let is_ours = |metadata: &fs::Metadata| metadata.is_dir() && files::is_own(metadata);
+        if folder.metadata().is_ok_and(|metadata| is_ours(&metadata))
+            && folder.file_name().as_encoded_bytes().starts_with(b"tl")
+        {
             sweep_folder(&folder.path());
         }
     }
@@ -239,15 +235,15 @@ fn sweep_folder(folder: &Path) {
     let Some(end) = bytes.iter().position(|&byte| byte == b'\n') else {
         return;
     };
-    let root = PathBuf::from(std::ffi::OsString::from_vec(bytes[..end].to_vec()));
-    let (Ok(mark), Ok(name)) = (
-        File::open(folder.join(PLACE)),
+    let (Some(root), Ok(mark), Ok(name)) = (
+        files::path_from_bytes(&bytes[..end]),
+        private().open(folder.join(PLACE)),
         str::from_utf8(&bytes[end + 1..]),
     ) else {
         return;
     };
     // a daemon whose root folder somebody removed still lives
-    if mark.try_lock().is_err() {
+    if !files::try_lock(&mark).is_ok_and(|taken| taken) {
         return;
     }
     drop(mark);
@@ -266,7 +262,10 @@ fn sweep_folder(folder: &Path) {
 /// Removes a folder without a mark: its daemon could not remove it whole, for example since it had too many open files.
 fn sweep_remains(folder: &Path) {
     let is_named = folder.file_name().is_some_and(|name| {
-        let digits = name.as_bytes().strip_prefix(b"tl").unwrap_or_default();
+        let digits = name
+            .as_encoded_bytes()
+            .strip_prefix(b"tl")
+            .unwrap_or_default();
         digits.len() == 16 && digits.iter().all(u8::is_ascii_hexdigit)
     });
     // one that starts makes its mark at once
@@ -283,6 +282,8 @@ fn sweep_remains(folder: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
+
     use crate::paths::{Beacon, running};
 
     fn root(test: &str) -> PathBuf {
@@ -309,7 +310,7 @@ mod tests {
         assert!(!cleanup_after_death(Some(&root), "one").unwrap());
         drop(first);
         assert_eq!(paths.presence().unwrap(), Presence::Absent);
-        assert!(!Path::new(SHARED_MEMORY).join(paths.stem()).exists());
+        assert!(!Path::new(shared_memory()).join(paths.stem()).exists());
         assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
         fs::remove_dir(&root).unwrap();
     }

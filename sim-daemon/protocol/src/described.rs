@@ -4,7 +4,9 @@
 use std::io::{Read, Write};
 use std::path::PathBuf;
 
-use crate::paths::{DaemonPaths, private};
+use sim_system::files::private;
+
+use crate::paths::DaemonPaths;
 use crate::{Description, ProtocolError};
 
 /// Longest description that a client reads [bytes].

@@ -1,8 +1,6 @@
 //! Room for the open files of a node: sockets and locks, since mappings keep none.
 
-use std::fs;
-
-use rustix::process::{Resource, getrlimit, setrlimit};
+use sim_system::open_files;
 
 use crate::ProtocolError;
 
@@ -15,14 +13,11 @@ const OF_A_GROUP: u64 = 21;
 
 /// Raises this process's soft limit of open files to the hard one when it is near. It never lowers it.
 pub(crate) fn make_room() {
-    let limit = getrlimit(Resource::Nofile);
-    let Some(soft) = limit.current else {
-        return;
-    };
+    let limit = open_files::limit();
     // a list that cannot be opened is one too many
-    let open = fs::read_dir("/proc/self/fd").map_or(soft, |files| files.count() as u64);
-    if open + OF_A_NODE > soft {
-        raise_limit();
+    let open = open_files::count().unwrap_or(limit);
+    if open.saturating_add(OF_A_NODE) > limit {
+        open_files::raise_limit();
     }
 }
 
@@ -31,22 +26,11 @@ pub(crate) fn make_room() {
 /// # Errors
 /// [`ProtocolError::Descriptors`] when that is not enough.
 pub fn make_room_for(groups: usize) -> Result<(), ProtocolError> {
-    raise_limit();
-    let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
-    if limit < OF_A_DAEMON + OF_A_GROUP * groups as u64 {
+    open_files::raise_limit();
+    if open_files::limit() < OF_A_DAEMON + OF_A_GROUP * groups as u64 {
         return Err(ProtocolError::descriptors(format!(
             "begin with {groups} groups"
         )));
     }
     Ok(())
-}
-
-fn raise_limit() {
-    let limit = getrlimit(Resource::Nofile);
-    let raised = rustix::process::Rlimit {
-        current: limit.maximum,
-        ..limit
-    };
-    // where the hard limit is reached too, the file that cannot be opened tells
-    let _ = setrlimit(Resource::Nofile, raised);
 }

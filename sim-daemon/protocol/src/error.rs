@@ -1,11 +1,12 @@
 //! What can go wrong between a client and a daemon, with the culprit and the cure.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
-use rustix::io::Errno;
-use rustix::process::{Resource, getrlimit};
+use sim_system::files::free_bytes;
+use sim_system::{open_files, process};
 
-use crate::problem::{FREE_MIN, Problem, folder_cure, free_bytes, other_problem, take_problem};
+use crate::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]
@@ -333,7 +334,12 @@ impl ProtocolError {
     /// A transport failure; `problem` is the transport's own error, which often does not know the cause.
     pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
         let action = action.into();
-        match take_problem().or_else(other_problem) {
+        let found = take_problem().or_else(other_problem);
+        let system = match found {
+            Some(Problem::System(error)) => Some(io::Error::from(error)),
+            _ => None,
+        };
+        match found {
             Some(Problem::Full {
                 folder,
                 free,
@@ -345,31 +351,26 @@ impl ProtocolError {
                 what: action,
             },
             Some(Problem::Damaged { path }) => ProtocolError::Damaged { path, action },
-            Some(Problem::System(Errno::MFILE | Errno::NFILE)) => {
+            _ if system.as_ref().is_some_and(open_files::is_exhausted) => {
                 ProtocolError::descriptors(action)
             }
-            // the transport names processes and files by /proc
-            _ if !Path::new("/proc/self").exists() => ProtocolError::Transport {
-                action,
-                problem: "/proc is missing; mount it (`mount -t proc proc /proc`)".to_owned(),
-            },
-            Some(Problem::System(errno)) => ProtocolError::Transport {
-                action,
-                problem: format!("{problem:?}, {errno}"),
-            },
-            None => ProtocolError::Transport {
-                action,
-                problem: format!("{problem:?}"),
-            },
+            _ => {
+                let problem = match (process::missing(), system) {
+                    (Some(missing), _) => missing.to_owned(),
+                    (None, Some(error)) => format!("{problem:?}, {error}"),
+                    (None, None) => format!("{problem:?}"),
+                };
+                ProtocolError::Transport { action, problem }
+            }
         }
     }
 
     /// A file or folder of the root that the system refuses.
     pub(crate) fn root(path: &Path, error: &std::io::Error) -> Self {
         let action = format!("use {}", path.display());
-        match Errno::from_io_error(error) {
-            Some(Errno::NOSPC) => ProtocolError::no_file_fits(path, action),
-            Some(Errno::MFILE | Errno::NFILE) => ProtocolError::descriptors(action),
+        match error.kind() {
+            io::ErrorKind::StorageFull => ProtocolError::no_file_fits(path, action),
+            _ if open_files::is_exhausted(error) => ProtocolError::descriptors(action),
             _ => ProtocolError::Root {
                 path: path.to_owned(),
                 problem: error.to_string(),
@@ -378,10 +379,10 @@ impl ProtocolError {
     }
 
     fn no_file_fits(path: &Path, what: String) -> Self {
-        let folder = path.parent().unwrap_or(path).to_string_lossy();
-        let (free, needed) = (free_bytes(&folder), FREE_MIN);
+        let folder = path.parent().unwrap_or(path);
+        let (free, needed) = (free_bytes(folder), FREE_MIN);
         ProtocolError::SharedMemory {
-            path: folder.into_owned(),
+            path: folder.to_string_lossy().into_owned(),
             free,
             needed,
             what,
@@ -389,7 +390,7 @@ impl ProtocolError {
     }
 
     pub(crate) fn descriptors(action: String) -> Self {
-        let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+        let limit = open_files::limit();
         ProtocolError::Descriptors { action, limit }
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use iceoryx2::sample::Sample;
+use sim_system::files::shared_memory;
 
 use crate::connection::{Connection, S, damaged, intact, intact_there, malformed};
 use crate::control::{Request, Response};
@@ -108,7 +109,7 @@ impl Journal {
             }
             Response::NoMemory { free, needed } => {
                 return Err(ProtocolError::SharedMemory {
-                    path: crate::paths::SHARED_MEMORY.to_owned(),
+                    path: shared_memory().to_owned(),
                     free,
                     needed,
                     what: "the journal of a recorder".to_owned(),

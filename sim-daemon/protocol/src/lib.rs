@@ -29,7 +29,6 @@
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
 mod affinity;
-mod cgroup;
 mod client;
 mod clock;
 mod command;
@@ -40,7 +39,7 @@ pub mod daemon_lock;
 mod described;
 mod description;
 pub mod descriptors;
-mod device_memory;
+pub mod device_memory;
 pub mod digest;
 mod discovery;
 mod error;
@@ -79,7 +78,7 @@ pub use daemon_lock::{cleanup_after_death, sweep};
 pub use description::{
     Description, FieldInfo, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
 };
-pub use device_memory::{Delivery, DeviceCommand, DeviceMemory};
+pub use device_memory::{Delivery, Descriptor, DeviceCommand, DeviceMemory};
 pub use discovery::{AttachOptions, find};
 pub use error::ProtocolError;
 pub use frame::{Entry, Frame, View};

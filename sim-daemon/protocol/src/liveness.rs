@@ -72,20 +72,3 @@ fn lost(paths: &DaemonPaths, beacon: Beacon) -> ProtocolError {
         pid: beacon.pid,
     }
 }
-
-/// Whether a process is gone, or has only its exit code left, as far as can be seen beside the daemon: in another
-/// container, processes have other numbers.
-pub(crate) fn is_gone(pid: u32, daemon: u32) -> bool {
-    let namespace = |process: &str| std::fs::read_link(format!("/proc/{process}/ns/pid")).ok();
-    if namespace("self") != namespace(&daemon.to_string()) {
-        return false;
-    }
-    let Ok(status) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else {
-        return true;
-    };
-    // the name stands in parentheses and may have any character; the state comes after it
-    let state = status
-        .rsplit_once(')')
-        .and_then(|(_, rest)| rest.trim_start().chars().next());
-    matches!(state, None | Some('Z' | 'X'))
-}

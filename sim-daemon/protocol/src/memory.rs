@@ -1,13 +1,12 @@
 //! Shared memory of a daemon: how much it will take, whether that is there, and taking it for certain.
 
 use std::fs::{self, OpenOptions};
+use std::io::ErrorKind;
 use std::path::Path;
 
-use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use sim_system::files::{free_bytes, shared_memory};
 
-use crate::cgroup;
 use crate::command::command_bytes;
-use crate::paths::SHARED_MEMORY;
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
 use crate::{Description, Dtype, ProtocolError, Table};
 
@@ -73,7 +72,7 @@ pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(
     let needed = shared as u64 + shared as u64 / 20;
     if needed > free.shared {
         return Err(ProtocolError::SharedMemory {
-            path: SHARED_MEMORY.to_owned(),
+            path: shared_memory().to_owned(),
             free: free.shared,
             needed,
             what: what.to_owned(),
@@ -92,20 +91,9 @@ pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(
 
 /// What can be taken now.
 pub(crate) fn free() -> Free {
-    let file_system = statvfs(SHARED_MEMORY).map_or(0, |status| status.f_bavail * status.f_frsize);
-    let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
-        let line = text
-            .lines()
-            .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-        Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
-    });
-    let group = cgroup::free_memory(Path::new("/"));
     Free {
-        shared: file_system,
-        memory: [machine, group]
-            .into_iter()
-            .flatten()
-            .fold(u64::MAX, u64::min),
+        shared: free_bytes(Path::new(shared_memory())),
+        memory: sim_system::memory::available(),
     }
 }
 
@@ -126,17 +114,16 @@ pub(crate) fn reserve(folder: &Path, port: u128, what: &str) -> Result<(), Proto
         .open(&path)
         .map_err(|error| failed(&error))?;
     let needed = file.metadata().map_err(|error| failed(&error))?.len();
-    match fallocate(&file, FallocateFlags::empty(), 0, needed) {
-        Ok(()) => Ok(()),
-        Err(rustix::io::Errno::NOSPC) => Err(full(needed, what)),
-        Err(error) => Err(failed(&error)),
-    }
+    sim_system::storage::reserve(&file, needed).map_err(|error| match error.kind() {
+        ErrorKind::StorageFull => full(needed, what),
+        _ => failed(&error),
+    })
 }
 
 /// The file system of shared memory has no room for what was asked of it.
 pub(crate) fn full(needed: u64, what: &str) -> ProtocolError {
     ProtocolError::SharedMemory {
-        path: SHARED_MEMORY.to_owned(),
+        path: shared_memory().to_owned(),
         free: free().shared,
         needed,
         what: what.to_owned(),

@@ -1,14 +1,11 @@
 //! Sleep until something is notified.
 
-use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::prelude::Service;
 use iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
-use rustix::event::{PollFd, PollFlags, poll};
-use rustix::io::Errno;
-use rustix::time::Timespec;
+use sim_system::files::wait_readable;
 
 use crate::ProtocolError;
 
@@ -23,16 +20,19 @@ where
     Listener<S>: FileDescriptorBased,
 {
     let failed = |error: &dyn std::fmt::Debug| ProtocolError::transport("wait for an event", error);
+    // SAFETY: it is closed by nobody but the listener.
+    let descriptor = unsafe { listener.file_descriptor().native_handle() };
     // SAFETY: the listener owns the descriptor, and is borrowed until the end.
-    let socket = unsafe { BorrowedFd::borrow_raw(listener.file_descriptor().native_handle()) };
-    let timeout = Timespec {
-        tv_sec: timeout.as_secs() as i64,
-        tv_nsec: timeout.subsec_nanos().into(),
-    };
-    match poll(&mut [PollFd::new(&socket, PollFlags::IN)], Some(&timeout)) {
-        Ok(0) | Err(Errno::INTR) => return Ok(()),
-        Ok(_) => {}
-        Err(error) => return Err(failed(&error)),
+    match unsafe { wait_readable(descriptor, timeout) } {
+        Some(Ok(false)) => return Ok(()),
+        Some(Ok(true)) => {}
+        Some(Err(error)) => return Err(failed(&error)),
+        None => {
+            return match listener.timed_wait(|_| {}, timeout) {
+                Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+                Err(error) => Err(failed(&error)),
+            };
+        }
     }
     match listener.try_wait(|_| {}) {
         Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),

@@ -10,19 +10,18 @@
 //! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
 //! of a Unix socket is limited to 107 bytes.
 
-use std::fs::{self, DirBuilder, File, Metadata, OpenOptions, TryLockError};
+use std::fs::{self, File, Metadata};
 use std::io::ErrorKind;
-use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
-use rustix::fs::OFlags;
+use sim_system::files::{self, exposed, make_private_folder, own_folder_name, private};
 
 use crate::ProtocolError;
 use crate::hash::Fnv;
-pub use crate::problem::SHARED_MEMORY;
+pub use sim_system::files::shared_memory;
 
 /// The variable that names the folder of a login session.
 pub const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
@@ -71,13 +70,7 @@ pub fn default_root() -> PathBuf {
     let session = variable(RUNTIME_FOLDER).filter(|folder| Some(folder) != STAND_IN.get());
     variable("TIGHTLOOP_ROOT")
         .or_else(|| session.map(|folder| folder.join("tightloop")))
-        .unwrap_or_else(|| {
-            format!(
-                "{SHARED_MEMORY}/tightloop-{}",
-                rustix::process::getuid().as_raw()
-            )
-            .into()
-        })
+        .unwrap_or_else(|| Path::new(shared_memory()).join(own_folder_name()))
 }
 
 /// A value of [`RUNTIME_FOLDER`] for this process, where the variable is unset: the absolute path of the root folder. A
@@ -168,10 +161,10 @@ impl DaemonPaths {
 
     /// The transport's folder.
     pub(crate) fn shared_folder(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(&self.stem)
+        Path::new(shared_memory()).join(&self.stem)
     }
 
-    /// The name of this daemon's folder in [`SHARED_MEMORY`].
+    /// The name of this daemon's folder in [`shared_memory`].
     pub fn stem(&self) -> &str {
         &self.stem
     }
@@ -190,11 +183,11 @@ impl DaemonPaths {
 
     /// What an open lock file says, whatever became of its name.
     pub(crate) fn presence_in(&self, lock: &File) -> Result<Presence, ProtocolError> {
-        match lock.try_lock_shared() {
-            Err(TryLockError::WouldBlock) => Ok(read_beacon(lock)),
-            Err(TryLockError::Error(error)) => Err(self.lock_error(&error)),
+        match files::try_lock_shared(lock) {
+            Ok(false) => Ok(read_beacon(lock)),
+            Err(error) => Err(self.lock_error(&error)),
             // the file may stay open, so closing it does not give the lock back
-            Ok(()) => match lock.unlock() {
+            Ok(true) => match files::unlock(lock) {
                 Ok(()) => Ok(Presence::Absent),
                 Err(error) => Err(self.lock_error(&error)),
             },
@@ -203,10 +196,7 @@ impl DaemonPaths {
 
     /// The lock file, if there is one.
     pub(crate) fn open_lock(&self) -> Result<Option<File>, ProtocolError> {
-        let opened = OpenOptions::new()
-            .read(true)
-            .custom_flags((OFlags::NONBLOCK | OFlags::NOFOLLOW).bits() as i32)
-            .open(self.lock_path());
+        let opened = private().write(false).open(self.lock_path());
         match opened {
             Ok(file) => Ok(Some(file)),
             Err(error)
@@ -226,7 +216,8 @@ impl DaemonPaths {
     pub(crate) fn transport_config(&self, session: u64) -> Config {
         let mut config = Config::default();
         let prefix = format!("{:08x}_", session as u32);
-        let folder = format!("{SHARED_MEMORY}/{}/", self.stem);
+        let separator = std::path::MAIN_SEPARATOR;
+        let folder = format!("{}{separator}{}{separator}", shared_memory(), self.stem);
         // lengths: 28 + 9 bytes here, at most 45 more for a socket, 107 allowed
         config.global.prefix =
             FileName::new(prefix.as_bytes()).expect("digits, letters and an underscore");
@@ -288,8 +279,7 @@ pub(crate) const STARTING: &str = "tightloop starting\n";
 /// What the holder of the lock says.
 fn read_beacon(file: &File) -> Presence {
     let mut bytes = [0; 128];
-    let text = file
-        .read_at(&mut bytes, 0)
+    let text = files::read_at(file, &mut bytes, 0)
         .ok()
         .and_then(|read| str::from_utf8(&bytes[..read]).ok());
     match text {
@@ -315,15 +305,6 @@ fn parse_beacon(text: &str) -> Option<Beacon> {
     })
 }
 
-/// How files of a daemon are opened: for their user only, and no links.
-pub(crate) fn private() -> OpenOptions {
-    let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
-    let mut options = OpenOptions::new();
-    options.read(true).write(true).mode(0o600);
-    options.custom_flags(flags.bits() as i32);
-    options
-}
-
 /// Makes a folder that only we may use, and returns it absolute.
 pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
     let error = |problem: String| ProtocolError::Root {
@@ -347,19 +328,16 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
     if metadata.is_symlink() {
         return Err(error("it is a link; remove it".to_owned()));
     }
-    if metadata.uid() != rustix::process::geteuid().as_raw() {
-        return Err(error(format!("it belongs to user {}", metadata.uid())));
+    match exposed(&metadata) {
+        Some(problem) => Err(error(problem)),
+        None => Ok(absolute),
     }
-    if metadata.mode() & 0o022 != 0 {
-        return Err(error("others may write in it".to_owned()));
-    }
-    Ok(absolute)
 }
 
 fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
-    DirBuilder::new().recursive(true).mode(0o700).create(path)?;
+    make_private_folder(path)?;
     // everybody may make links in shared memory, at names that can be guessed
-    let metadata = match path.starts_with(SHARED_MEMORY) {
+    let metadata = match path.starts_with(shared_memory()) {
         true => fs::symlink_metadata(path)?,
         false => fs::metadata(path)?,
     };
@@ -385,12 +363,13 @@ mod tests {
         }
     }
 
+    #[cfg(unix)] // Windows lets few users make links
     #[test]
     fn a_link_in_shared_memory_is_not_followed() {
         let name = format!("tightloop-link-{}", std::process::id());
         let (target, link) = (
             std::env::temp_dir().join(&name),
-            Path::new(SHARED_MEMORY).join(&name),
+            Path::new(shared_memory()).join(format!("{name}-link")),
         );
         fs::create_dir(&target).unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();

@@ -1,14 +1,12 @@
 //! Why shared memory could not be made or opened: the transport's own errors rarely know.
 
 use std::cell::RefCell;
-use std::fs::File;
+use std::io;
 use std::path::Path;
 
-use rustix::fs::{Access, access, statvfs};
-use rustix::io::Errno;
+use sim_system::files::{SHARED_MEMORY_CURE, free_bytes, is_writable, shared_memory};
+use sim_system::open_files;
 
-/// Where POSIX shared memory is on Linux.
-pub const SHARED_MEMORY: &str = "/dev/shm";
 /// With less than this left, what the transport writes beside its memory does not fit either [bytes].
 pub(crate) const FREE_MIN: u64 = 64 << 10;
 
@@ -30,7 +28,23 @@ pub(crate) enum Problem {
         path: String,
     },
     /// The system refuses, for example since there are too many open files.
-    System(Errno),
+    System(SystemError),
+}
+
+/// What the system says, as it can be kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SystemError(i32);
+
+impl From<io::Error> for SystemError {
+    fn from(error: io::Error) -> SystemError {
+        SystemError(error.raw_os_error().unwrap_or(0))
+    }
+}
+
+impl From<SystemError> for io::Error {
+    fn from(error: SystemError) -> io::Error {
+        io::Error::from_raw_os_error(error.0)
+    }
 }
 
 thread_local! {
@@ -44,24 +58,23 @@ pub(crate) fn take_problem() -> Option<Problem> {
 
 /// The problem of a call that made a file without us, if there is one with the file system.
 pub(crate) fn other_problem() -> Option<Problem> {
-    match File::open("/") {
-        Err(error) => Errno::from_io_error(&error).map(Problem::System),
-        Ok(_) => no_room(FREE_MIN),
+    match open_files::try_one() {
+        Err(error) => Some(Problem::System(error.into())),
+        Ok(()) => no_room(FREE_MIN),
     }
 }
 
 /// The problem of a shared memory with less than so many bytes left.
 pub(crate) fn no_room(needed: u64) -> Option<Problem> {
-    let problem = Problem::full(SHARED_MEMORY, needed);
+    let problem = Problem::full(Path::new(shared_memory()), needed);
     matches!(problem, Problem::Full { free, .. } if free < needed).then_some(problem)
 }
 
-/// What to do about a folder that cannot be used. Frames go through [`SHARED_MEMORY`] wherever the root folder is.
+/// What to do about a folder that cannot be used. Frames go through [`shared_memory`] wherever the root folder is.
 pub(crate) fn folder_cure(folder: &Path) -> &'static str {
-    let writable = access(SHARED_MEMORY, Access::WRITE_OK | Access::EXEC_OK).is_ok();
-    if folder.starts_with(SHARED_MEMORY) && !writable {
-        "frames go through /dev/shm, which must be writable for this user: mount memory there, by \
-         `mount -t tmpfs -o mode=1777 tmpfs /dev/shm`"
+    let shared = Path::new(shared_memory());
+    if folder.starts_with(shared) && !is_writable(shared) {
+        SHARED_MEMORY_CURE
     } else {
         "set TIGHTLOOP_ROOT to a folder of your own"
     }
@@ -72,16 +85,11 @@ pub(crate) fn failed(problem: Problem) {
     PROBLEM.replace(Some(problem));
 }
 
-/// Bytes free on the file system of a folder; 0 where that cannot be asked.
-pub(crate) fn free_bytes(folder: &str) -> u64 {
-    statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize)
-}
-
 impl Problem {
     /// The file system of a folder is full.
-    pub(crate) fn full(folder: &str, needed: u64) -> Problem {
+    pub(crate) fn full(folder: &Path, needed: u64) -> Problem {
         Problem::Full {
-            folder: folder.to_owned(),
+            folder: folder.to_string_lossy().into_owned(),
             free: free_bytes(folder),
             needed,
         }

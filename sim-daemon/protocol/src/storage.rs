@@ -8,15 +8,16 @@
 
 use std::cell::Cell;
 use std::fmt::Debug;
+use std::fs;
+use std::io::{self, ErrorKind};
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
-use std::os::fd::{AsRawFd, OwnedFd};
+use std::path::{Path as FilePath, PathBuf};
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use iceoryx2::config::Config;
-use iceoryx2::prelude::SemanticString;
 use iceoryx2_bb_elementary_traits::testing::abandonable::Abandonable;
 use iceoryx2_bb_elementary_traits::zero_copy_send::ZeroCopySend;
 use iceoryx2_bb_memory::bump_allocator::BumpAllocator;
@@ -30,9 +31,8 @@ use iceoryx2_cal::named_concept::{
     NamedConceptDoesExistError, NamedConceptListError, NamedConceptMgmt,
     NamedConceptPathHintRemoveError, NamedConceptRemoveError, Path,
 };
-use rustix::fs::{self, AtFlags, CWD, FallocateFlags, FileType, Mode, OFlags};
-use rustix::io::Errno;
-use rustix::mm::ProtFlags;
+use sim_system::files::private;
+use sim_system::storage::NewFile;
 
 use crate::hash::Fnv;
 use crate::mapping::{self, Mapping};
@@ -97,7 +97,7 @@ impl<T: Content> Drop for Storage<T> {
             // SAFETY: the value was initialised before the file got its name, and its last owner drops it.
             unsafe { (*self.data()).value.assume_init_drop() };
             // somebody else may have removed it
-            let _ = fs::unlink(self.config.path_for(&self.name).as_bytes());
+            let _ = fs::remove_file(path(&self.config, &self.name));
         }
     }
 }
@@ -268,10 +268,10 @@ impl<T: Content> Builder<'_, T> {
             DynamicStorageCreateError::InternalError
         };
         let folder = self.config.get_path_hint().to_string();
-        let file = new_file(&folder, bytes as u64).map_err(failed)?;
-        let protection = ProtFlags::READ | ProtFlags::WRITE;
-        let mapping = Mapping::new(&file, bytes, protection, (owner(&self.config), true))
-            .map_err(|error| failed(Problem::System(error)))?;
+        let file = new_file(FilePath::new(&folder), bytes as u64).map_err(failed)?;
+        let whose = (owner(&self.config), true);
+        let mapping = Mapping::new(file.file(), bytes, true, whose)
+            .map_err(|error| failed(Problem::System(error.into())))?;
         let storage = Storage {
             mapping,
             config: self.config.clone(),
@@ -288,14 +288,12 @@ impl<T: Content> Builder<'_, T> {
         if !self.initializer.call(value, &mut allocator) {
             return Err(DynamicStorageCreateError::InitializationFailed);
         }
-        let (made, path) = (
-            format!("/proc/self/fd/{}", file.as_raw_fd()),
-            self.config.path_for(&self.name),
-        );
-        match fs::linkat(CWD, made, CWD, path.as_bytes(), AtFlags::SYMLINK_FOLLOW) {
+        match file.publish(&path(&self.config, &self.name)) {
             Ok(()) => {}
-            Err(Errno::EXIST) => return Err(DynamicStorageCreateError::AlreadyExists),
-            Err(error) => return Err(failed(Problem::System(error))),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                return Err(DynamicStorageCreateError::AlreadyExists);
+            }
+            Err(error) => return Err(failed(Problem::System(error.into()))),
         }
         if self.has_ownership {
             storage.acquire_ownership();
@@ -304,34 +302,30 @@ impl<T: Content> Builder<'_, T> {
     }
 
     fn open_existing(&self, access: AccessMode) -> Result<Storage<T>, DynamicStorageOpenError> {
-        let path = self.config.path_for(&self.name);
-        let (how, protection) = match access {
-            AccessMode::ReadWrite => (OFlags::RDWR, ProtFlags::READ | ProtFlags::WRITE),
-            _ => (OFlags::RDONLY, ProtFlags::READ),
-        };
-        let system = |error| {
-            failed(Problem::System(error));
+        let path = path(&self.config, &self.name);
+        let may_write = matches!(access, AccessMode::ReadWrite);
+        let system = |error: io::Error| {
+            failed(Problem::System(error.into()));
             DynamicStorageOpenError::InternalError
         };
-        let flags = how | OFlags::NOFOLLOW | OFlags::CLOEXEC | OFlags::NONBLOCK;
-        let file = match fs::open(path.as_bytes(), flags, Mode::empty()) {
-            Err(Errno::NOENT) => return Err(DynamicStorageOpenError::DoesNotExist),
+        let file = match private().write(may_write).open(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(DynamicStorageOpenError::DoesNotExist);
+            }
             opened => opened.map_err(system)?,
         };
-        let status = fs::fstat(&file).map_err(system)?;
-        let bytes = status.st_size as usize;
-        let is_file = FileType::from_raw_mode(status.st_mode) == FileType::RegularFile;
-        let mapping = (is_file && bytes >= size_of::<Data<T>>())
-            .then(|| {
-                Mapping::new(&file, bytes, protection, (owner(&self.config), false)).map_err(system)
-            })
+        let status = file.metadata().map_err(system)?;
+        let bytes = status.len() as usize;
+        let whose = (owner(&self.config), false);
+        let mapping = (status.is_file() && bytes >= size_of::<Data<T>>())
+            .then(|| Mapping::new(&file, bytes, may_write, whose).map_err(system))
             .transpose()?;
         // SAFETY: the mapping is long enough, and any bits are a number.
         let whole = |mapping: &Mapping| unsafe {
             mapping.start().cast::<u64>().read_volatile() == bytes as u64
         };
         let Some(mapping) = mapping.filter(whole) else {
-            let path = path.to_string();
+            let path = path.to_string_lossy().into_owned();
             failed(Problem::Damaged { path });
             return Err(DynamicStorageOpenError::InternalError);
         };
@@ -370,19 +364,16 @@ pub(crate) fn run_of(config: &Config) -> u64 {
     run(&folder.to_string(), &prefix.to_string())
 }
 
-/// A new file with its pages, which has no name yet: whoever is killed now leaves nothing.
-fn new_file(folder: &str, bytes: u64) -> Result<OwnedFd, Problem> {
-    let flags = OFlags::RDWR | OFlags::TMPFILE | OFlags::CLOEXEC;
-    let file = fs::open(folder, flags, Mode::RUSR | Mode::WUSR).map_err(Problem::System)?;
-    let take = |first, bytes| fs::fallocate(&file, FallocateFlags::empty(), first, bytes);
-    let taken = if READER_RESERVES.get() && bytes > 2 * MANAGEMENT {
-        take(0, MANAGEMENT).and_then(|()| take(bytes - MANAGEMENT, MANAGEMENT))
-    } else {
-        take(0, bytes)
-    };
-    match taken {
-        Ok(()) => Ok(file),
-        Err(Errno::NOSPC) => Err(Problem::full(folder, bytes)),
-        Err(error) => Err(Problem::System(error)),
-    }
+/// A new file with its pages, which has no name yet.
+fn new_file(folder: &FilePath, bytes: u64) -> Result<NewFile, Problem> {
+    let ends = (READER_RESERVES.get() && bytes > 2 * MANAGEMENT).then_some(MANAGEMENT);
+    NewFile::create(folder, bytes, ends).map_err(|error| match error.kind() {
+        ErrorKind::StorageFull => Problem::full(folder, bytes),
+        _ => Problem::System(error.into()),
+    })
+}
+
+/// Where the file of a name is.
+fn path<T: Content>(config: &file::Configuration<T>, name: &FileName) -> PathBuf {
+    config.path_for(name).to_string().into()
 }

@@ -1,8 +1,6 @@
 //! The services of one daemon and their limits, said once for both sides. The only file that knows iceoryx2's builders.
 
 use std::fmt::Debug;
-use std::fs::{self, Permissions};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::Once;
 use std::time::Duration;
@@ -105,7 +103,7 @@ fn close_folders(config: &Config) {
     let nodes = Path::new(config.global.node_dir().as_str()).read_dir();
     for node in nodes.into_iter().flatten().flatten() {
         // a node that ends meanwhile takes its folder with it
-        let _ = fs::set_permissions(node.path(), Permissions::from_mode(0o700));
+        sim_system::files::close_to_others(&node.path());
     }
 }
 

@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use sim_protocol::{
     AttachOptions, Client, Description, Journal, JournalEntry, ProtocolError, keep_waiting,
 };
+use sim_system::signals;
 
 use super::blocks::BLOCK_MAX;
 use super::failure::failed;
@@ -61,9 +61,10 @@ impl From<Stopped> for End {
 pub(crate) fn run(args: &cli::Record) -> Result<(), DaemonError> {
     check(args)?;
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGTERM, SIGINT, SIGHUP] {
-        catch(signal, &stop)?;
-    }
+    signals::on_stop(&stop).map_err(|error| DaemonError::System {
+        action: "handle signals",
+        problem: error.to_string(),
+    })?;
     let mut hook = || match stop.load(Ordering::Relaxed) {
         true => ControlFlow::Break(()),
         false => ControlFlow::Continue(()),
@@ -156,16 +157,6 @@ fn is_there(path: &Path) -> DaemonError {
         path,
         "is there already; choose another name, or overwrite it with --force",
     )
-}
-
-fn catch(signal: i32, flag: &Arc<AtomicBool>) -> Result<(), DaemonError> {
-    match signal_hook::flag::register(signal, Arc::clone(flag)) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(DaemonError::System {
-            action: "handle signals",
-            problem: error.to_string(),
-        }),
-    }
 }
 
 fn create(args: &cli::Record) -> Result<File, DaemonError> {

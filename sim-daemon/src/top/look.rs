@@ -2,11 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use rustix::param::page_size;
 use sim_physics::arrays::status::FROZEN;
 use sim_protocol::{AttachOptions, Client, Description, ProtocolError, Timing, keep_waiting};
-
-use crate::list::age;
+use sim_system::process;
 
 /// A daemon that is watched.
 pub(super) struct Watched {
@@ -47,8 +45,10 @@ pub(super) struct Look {
     pub(super) frozen: usize,
     /// Contacts of a world, where frames carry their number.
     pub(super) contacts: Option<f64>,
-    /// Memory of the process, and the part of it that is shared [bytes].
-    pub(super) memory: Option<(u64, u64)>,
+    /// Memory of the process [bytes].
+    pub(super) memory: Option<u64>,
+    /// The part of it that is shared, where the system tells [bytes].
+    pub(super) memory_shared: Option<u64>,
     /// Simulated seconds per second that frames keep to, if any.
     pub(super) realtime: Option<f64>,
     /// Of each group, since it started or somebody counted anew.
@@ -110,7 +110,7 @@ impl Watched {
             name: self.name.clone(),
             device: description.device.clone(),
             pid: description.pid,
-            age: age(description.pid),
+            age: process::age(description.pid),
             worlds: description.worlds * self.groups.len(),
             groups: self.groups.len(),
             frames_per_s,
@@ -120,7 +120,8 @@ impl Watched {
             seen,
             frozen: self.seen.iter().map(|seen| seen.frozen).sum(),
             contacts: contacts.map(|contacts| contacts / seen.max(1) as f64),
-            memory: memory(description.pid),
+            memory: process::memory(description.pid),
+            memory_shared: process::memory_shared(description.pid),
             realtime: description.pace.map(|pace| pace.realtime),
             timing,
         })
@@ -140,13 +141,4 @@ impl Seen {
             contacts: contacts.map(|counts| counts.iter().copied().map(f64::from).sum()),
         }
     }
-}
-
-/// Memory that a process uses, and the part of it that is shared [bytes].
-fn memory(pid: u32) -> Option<(u64, u64)> {
-    let text = std::fs::read_to_string(format!("/proc/{pid}/statm")).ok()?;
-    let mut pages = text.split_whitespace().skip(1).map(str::parse::<u64>);
-    let (resident, shared) = (pages.next()?.ok()?, pages.next()?.ok()?);
-    let bytes = page_size() as u64;
-    Some((resident * bytes, shared * bytes))
 }

@@ -129,13 +129,15 @@ fn text(look: &Look) -> String {
             all(contacts),
         ));
     }
-    if let Some((memory, shared)) = look.memory {
+    if let Some(memory) = look.memory {
         metrics.push((
             "memory_bytes",
             "Memory of the daemon",
             "gauge",
             all(memory as f64),
         ));
+    }
+    if let Some(shared) = look.memory_shared {
         metrics.push((
             "shared_memory_bytes",
             "Memory that it shares",

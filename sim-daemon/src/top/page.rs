@@ -21,17 +21,15 @@ pub(super) fn text(look: &Look) -> String {
         || "not in its frames".to_owned(),
         |count| format!("{count:.1} a world"),
     );
-    let memory = look.memory.map_or_else(
-        || "–".to_owned(),
-        |(all, shared)| {
-            let megabytes = |bytes: u64| bytes as f64 / 1e6;
-            format!(
-                "{:.0} MB, of it {:.0} MB shared",
-                megabytes(all),
-                megabytes(shared)
-            )
-        },
-    );
+    let megabytes = |bytes: u64| format!("{:.0} MB", bytes as f64 / 1e6);
+    let memory = match (
+        look.memory.map(megabytes),
+        look.memory_shared.map(megabytes),
+    ) {
+        (Some(all), Some(shared)) => format!("{all}, of it {shared} shared"),
+        (Some(all), None) => all,
+        (None, _) => "–".to_owned(),
+    };
     let pace = look.realtime.map_or_else(
         || "as fast as it can".to_owned(),
         |factor| format!("{factor} of real time"),
@@ -123,8 +121,8 @@ pub(super) fn json(look: &Look) -> Value {
         "seen_worlds": look.seen,
         "faulted_worlds": look.frozen,
         "contacts_per_world": look.contacts,
-        "memory_bytes": look.memory.map(|(all, _)| all),
-        "shared_bytes": look.memory.map(|(_, shared)| shared),
+        "memory_bytes": look.memory,
+        "shared_bytes": look.memory_shared,
         "realtime": look.realtime,
         "timing_us": look.timing,
     })

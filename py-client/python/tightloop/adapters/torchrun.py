@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tightloop import checks
+from tightloop import checks, system
 from tightloop.adapters.gathering import ranges
 from tightloop.env import Task, VectorEnv
 from tightloop.errors import ArgumentError
@@ -105,5 +105,5 @@ class Rank:
                 raise ArgumentError(f"make_env: {name} follows from the rank; leave it out")
         rows = self.worlds(num_envs)
         if threads is None:
-            threads = max(1, len(os.sched_getaffinity(0)) // self.local_size)
+            threads = max(1, system.usable_cores() // self.local_size)
         return VectorEnv(task, rows.stop - rows.start, first_env=rows.start, threads=threads, **options)

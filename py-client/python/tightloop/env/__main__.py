@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tightloop import _core
+from tightloop import _core, system
 from tightloop.env.registry import TASKS, make_task
 from tightloop.env.rendering import FIELDS
 from tightloop.env.simulation import DAEMON_OPTIONS, fields_of
@@ -75,10 +74,7 @@ def main() -> int:
     except ArgumentError as problem:
         parser.exit(2, f"error: {problem}\n")
     # `tightloop serve -` reads the scene from standard input
-    file = os.memfd_create("scene")
-    os.write(file, scene.encode())
-    os.lseek(file, 0, os.SEEK_SET)
-    os.dup2(file, 0)
+    system.give_standard_input(scene.encode())
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _core.command_line(["tightloop", "serve", "-", *arguments])
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
-import os
 import signal
 import socket
 import sys
 import threading
 import webbrowser
-from pathlib import Path
 from typing import NoReturn
 
+from tightloop import system
 from tightloop.errors import TightloopError
 from tightloop.view import dependencies, gate
 
@@ -62,13 +60,14 @@ def main(arguments: list[str]) -> int:
     """Run the subcommand; returns its exit code: 0 done, 1 failed, 2 misused."""
     given = _parsed(arguments)
     stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in system.stop_signals():
         signal.signal(number, lambda *_: stopped.set())
     try:
         dependencies.check("viser")
         from tightloop.view.server import Server
 
-        _give_way()
+        # the simulation goes first where there are not enough cores for both
+        system.give_way()
         names = given.allow_host
         server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds, names=names)
     except (TightloopError, OSError) as problem:
@@ -105,15 +104,6 @@ def _parsed(arguments: list[str]) -> argparse.Namespace:
 def _answer(kind: str, message: str) -> None:
     """Tell `tightloop.viewer_process.Viewer` why there is no page."""
     print(json.dumps({"error": {"kind": kind, "message": message}}), flush=True)
-
-
-def _give_way() -> None:
-    """Let the simulation go first where there are not enough cores for both."""
-    os.nice(5)
-    # Linux weighs sessions against each other first; one that is ours alone steps back as a whole
-    if os.getsid(0) == os.getpid():
-        with contextlib.suppress(OSError):
-            Path("/proc/self/autogroup").write_text("5")
 
 
 def _host(text: str) -> str:

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 
+from tightloop import system
 from tightloop.errors import TightloopError
 from tightloop.view.cameras import PRESETS
 
@@ -68,7 +69,7 @@ def main(arguments: list[str]) -> int:
     given = parser().parse_args(arguments)
     shows = sys.stderr.isatty()
     stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in system.stop_signals():
         signal.signal(number, lambda *_: stopped.set())
 
     def tell(seconds: float) -> bool:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import threading
 import time
 from collections.abc import Sequence
 
 import viser
 
+from tightloop import system
 from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
 from tightloop.view import guarded_server
 from tightloop.view.frame_stream import FEW_WORLDS, FrameStream, open_stream
@@ -72,7 +72,7 @@ class Server:
             began = time.monotonic()
             if parent is not None and began - looked_at > _PARENT_SECONDS:
                 looked_at = began
-                if os.getppid() != parent:
+                if system.is_orphan(parent):
                     return
             try:
                 arrived = self._update()

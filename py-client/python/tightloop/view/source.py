@@ -31,7 +31,7 @@ CONTACT_FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_for
 
 def is_recording(target: str) -> bool:
     """Return whether a target is a file, not the name of a daemon."""
-    return target.endswith(".tlrec") or "/" in target
+    return target.endswith(".tlrec") or any(mark in target for mark in ("/", os.sep))
 
 
 def check_name(target: str) -> None:

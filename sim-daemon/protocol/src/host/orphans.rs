@@ -3,16 +3,16 @@
 use std::collections::HashSet;
 use std::fs::{metadata, read_dir};
 use std::io::ErrorKind;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+
+use sim_system::files::is_write_only;
+use sim_system::process;
 
 /// Kinds of files that belong to ports.
 const OF_PORTS: [&str; 4] = ["connection", "data", "event", "event_mgmt"];
 /// A monitor has this file, one that ends in `_owner_lock` and one that ends in `_context`.
 const MONITOR: &str = "node_monitor";
 const CONTEXT: &str = "node_monitor_context";
-/// Mode of a context while its process still makes the monitor, as iceoryx2 sets it.
-const UNFINISHED: u32 = 0o200;
 
 /// Files of ports without a tag, and all files of nodes that are no nodes to iceoryx2 any more: their monitor is not
 /// complete, and their process is gone or they are among those `given` details.
@@ -49,9 +49,8 @@ pub(super) fn orphans(folder: &Path, given: &HashSet<u128>) -> std::io::Result<H
 /// Nodes whose monitor is complete: iceoryx2 tells whether they live, and cleans up after them.
 fn watched(nodes: &[PathBuf]) -> HashSet<u128> {
     let with = |kind| move |file: &&PathBuf| extension(file) == Some(kind);
-    let is_finished = |file: &&PathBuf| {
-        metadata(file).is_ok_and(|is| is.permissions().mode() & 0o777 != UNFINISHED)
-    };
+    // so iceoryx2 marks a context while its process still makes the monitor
+    let is_finished = |file: &&PathBuf| metadata(file).is_ok_and(|is| !is_write_only(&is));
     let contexts = nodes.iter().filter(with(CONTEXT)).filter(is_finished);
     let finished: HashSet<u128> = contexts.flat_map(|file| ids(file)).collect();
     let monitors = nodes
@@ -67,8 +66,7 @@ fn is_no_folder(error: ErrorKind) -> bool {
 
 /// Whether the process of a node lives; its number is in bits 64 to 95 of the id.
 fn has_process(node: u128) -> bool {
-    let pid = (node >> 64) as u32;
-    Path::new(&format!("/proc/{pid}")).exists()
+    process::exists((node >> 64) as u32)
 }
 
 fn extension(file: &Path) -> Option<&str> {
@@ -90,12 +88,13 @@ fn ids(file: &Path) -> Vec<u128> {
         .collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
     use std::fs::{
         Permissions, create_dir, create_dir_all, remove_dir_all, set_permissions, write,
     };
+    use std::os::unix::fs::PermissionsExt;
 
     const LIVING: &str = "158456556240748546097084906779";
     const DEAD: &str = "237684718755018774577577737499";

@@ -1,6 +1,5 @@
 //! What a host looks after: leases, control requests, observers, and the answers to commands.
 
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -17,7 +16,7 @@ use crate::affinity::CoreAffinity;
 use crate::clock;
 use crate::control::{Request, Response};
 use crate::described::{self, Damage};
-use crate::device_memory::Door;
+use crate::device_memory::{Door, Visitor};
 use crate::guard::guarded;
 use crate::loaned;
 use crate::mapping;
@@ -45,7 +44,7 @@ pub(super) struct State {
     pub(super) observers: Observers,
     pub(super) door: Door,
     /// Who waits for device memory, and of which lease.
-    pub(super) visitor: Option<(u64, UnixStream)>,
+    pub(super) visitor: Option<(u64, Visitor)>,
     pub(super) polled: Instant,
     pub(super) frames: u64,
     pub(super) inbox: Inbox,

@@ -172,7 +172,7 @@ def vector(value: ArrayLike, name: str) -> tuple[float, float]:
 def _file_of(kind: str, xml_file: str) -> Path:
     """Return the file of a model, found as gymnasium does."""
     name = str(xml_file)
-    if name.startswith((".", "/")):
+    if name.startswith(".") or Path(name).is_absolute():
         path = Path(name)
     elif name.startswith("~"):
         path = Path(name).expanduser()

@@ -1,11 +1,4 @@
-//! Device memory that a daemon gives to the holder of its lease. Descriptors cross by a Unix socket, since samples carry none.
-//!
-//! ```text
-//! client   connects to <session>.socket, writes the number of its lease, asks for the memory by a control request
-//! daemon   takes the connections that wait, checks user and lease, makes the memory
-//! daemon   sends a line of JSON with the descriptors, or with the reason why there are none, and closes
-//! ```
-//! The daemon waits for no client. It closes a connection that has not named a lease when the request comes.
+//! The socket by which descriptors cross.
 
 use std::fs::{self, Permissions};
 use std::io::{IoSlice, IoSliceMut, Read, Write};
@@ -23,6 +16,7 @@ use rustix::net::{
 use rustix::process::Uid;
 use serde::{Deserialize, Serialize};
 
+use super::{Delivery, DeviceMemory};
 use crate::ProtocolError;
 use crate::hook::Hook;
 use crate::paths::DaemonPaths;
@@ -34,41 +28,6 @@ const ANSWER_MAX: usize = 1 << 16;
 /// How long the hook waits for its turn.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Memory on the card of a daemon, for one lease: slots of frames, then an array per command.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DeviceMemory {
-    /// Identifies the card across APIs: 16 bytes as hexadecimal digits.
-    pub uuid: String,
-    /// Size of the allocation [bytes].
-    pub allocated: u64,
-    /// Whether the allocation belongs to one buffer alone, which an import must say.
-    pub dedicated: bool,
-    /// Number of slots.
-    pub slots: usize,
-    /// Distance of neighbouring slots [bytes].
-    pub stride: u64,
-    /// Where each field begins in a slot, in the order of the description [bytes].
-    pub offsets: Vec<u64>,
-    /// The commands that may be left here.
-    pub commands: Vec<DeviceCommand>,
-    /// Why both processes order their work by waiting on the host; none where timelines order it on the card.
-    pub host_order: Option<String>,
-}
-
-/// Where a command is left: `(worlds, columns)` of float32, world-major.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DeviceCommand {
-    /// Name, such as `joint_f`.
-    pub name: String,
-    /// Columns per world.
-    pub columns: usize,
-    /// First byte in the memory.
-    pub offset: u64,
-}
-
-/// Device memory with its descriptors: that of the memory, then those of the timelines of done frames and of ready commands, if any.
-pub type Delivery = (DeviceMemory, Vec<OwnedFd>);
-
 /// The daemon's answer.
 #[derive(Serialize, Deserialize)]
 enum Answer {
@@ -79,6 +38,9 @@ enum Answer {
 fn path(paths: &DaemonPaths, session: u64) -> PathBuf {
     paths.shared_folder().join(format!("{session:016x}.socket"))
 }
+
+/// The connection of a client that has named its lease.
+pub(crate) type Visitor = UnixStream;
 
 /// The daemon's end.
 #[derive(Debug)]

@@ -1,0 +1,58 @@
+//! Cores of a thread.
+
+use rustix::thread::{CpuSet, sched_getaffinity, sched_getcpu, sched_setaffinity};
+
+/// The core that this thread runs on; none where the system does not tell.
+pub fn current() -> Option<usize> {
+    Some(sched_getcpu())
+}
+
+/// Moves this thread off `core` if it is there and may run elsewhere, and says whether it moved. It may come back at once if
+/// the system thinks so; where it may run stays the user's choice.
+pub fn leave(core: usize) -> bool {
+    let Ok(allowed) = sched_getaffinity(None) else {
+        return false;
+    };
+    let mut others = allowed;
+    others.unset(core);
+    if sched_getcpu() != core || others.count() == 0 || sched_setaffinity(None, &others).is_err() {
+        return false;
+    }
+    // that failed only if it was changed meanwhile
+    let _ = sched_setaffinity(None, &allowed);
+    sched_getcpu() != core
+}
+
+/// Keeps this thread, and those that it starts, on some cores.
+///
+/// # Errors
+/// Why not, and what to do.
+pub fn keep_to(cores: &[usize]) -> Result<(), String> {
+    let mut set = CpuSet::new();
+    for &core in cores {
+        if core >= CpuSet::MAX_CPU {
+            return Err(format!("numbers end at {}", CpuSet::MAX_CPU - 1));
+        }
+        set.set(core);
+    }
+    sched_setaffinity(None, &set)
+        .map_err(|error| format!("{error}; /proc/cpuinfo lists the processors"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_leaves_a_core_and_keeps_its_choice_of_cores() {
+        let allowed = sched_getaffinity(None).unwrap();
+        if allowed.count() < 2 {
+            return; // nowhere to go
+        }
+        let core = sched_getcpu();
+        // the system may move us between the two lines: then there is nothing to leave
+        assert!(leave(core) || sched_getcpu() != core);
+        assert_eq!(sched_getaffinity(None).unwrap(), allowed);
+        assert!(!leave(CpuSet::MAX_CPU - 1), "it is not there");
+    }
+}

@@ -1,0 +1,4 @@
+//! What macOS and Windows share: the crate `sysinfo` asks them.
+
+pub mod memory;
+pub mod process;
