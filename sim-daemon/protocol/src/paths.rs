@@ -316,12 +316,7 @@ pub(crate) fn private_folder(path: &Path) -> Result<PathBuf, ProtocolError> {
         match made_folder(path) {
             Ok(made) => break made,
             // the last daemon there takes the folder with it, maybe right now: it was there, and is no folder any more
-            Err(cause)
-                if matches!(cause.kind(), ErrorKind::NotFound | ErrorKind::AlreadyExists)
-                    && tries < TRIES =>
-            {
-                tries += 1;
-            }
+            Err(cause) if files::is_passing(&cause) && tries < TRIES => tries += 1,
             Err(cause) => return Err(ProtocolError::root(path, &cause)),
         }
     };
@@ -341,13 +336,12 @@ fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
         true => fs::symlink_metadata(path)?,
         false => fs::metadata(path)?,
     };
-    Ok((metadata, fs::canonicalize(path)?))
+    Ok((metadata, files::absolute(path)?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn names_with_slashes_dots_or_nothing_are_refused() {
@@ -382,8 +376,11 @@ mod tests {
         );
     }
 
+    #[cfg(unix)] // on Windows the folder stays, since the lock file in it is open
     #[test]
     fn a_folder_that_others_remove_meanwhile_is_made_again() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+
         let path = std::env::temp_dir().join(format!("tightloop-races-{}", std::process::id()));
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {

@@ -43,6 +43,22 @@ pub fn make_private_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().recursive(true).mode(0o700).create(path)
 }
 
+/// The absolute path of a file or folder that is there, without links.
+///
+/// # Errors
+/// Those of the system.
+pub fn absolute(path: &Path) -> io::Result<PathBuf> {
+    fs::canonicalize(path)
+}
+
+/// Whether a folder could not be made since somebody else makes or removes it right now.
+pub fn is_passing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::NotFound | io::ErrorKind::AlreadyExists
+    )
+}
+
 /// Why others could change what is in a folder, if they can.
 pub fn exposed(folder: &Metadata) -> Option<String> {
     if !is_own(folder) {

@@ -10,7 +10,9 @@ use std::ptr::null_mut;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use windows_sys::Win32::Foundation::{ERROR_IO_PENDING, ERROR_LOCK_VIOLATION};
+use windows_sys::Win32::Foundation::{
+    ERROR_IO_PENDING, ERROR_LOCK_VIOLATION, ERROR_SHARING_VIOLATION,
+};
 use windows_sys::Win32::Storage::FileSystem::{
     GetDiskFreeSpaceExW, LOCKFILE_EXCLUSIVE_LOCK, LOCKFILE_FAIL_IMMEDIATELY, LockFileEx,
     UnlockFileEx,
@@ -63,6 +65,21 @@ pub fn make_private(options: &mut OpenOptions) -> &mut OpenOptions {
 /// Those of the system.
 pub fn make_private_folder(path: &Path) -> io::Result<()> {
     fs::create_dir_all(path)
+}
+
+/// The absolute path of a file or folder that is there, as users write it.
+///
+/// # Errors
+/// Those of the system.
+pub fn absolute(path: &Path) -> io::Result<PathBuf> {
+    std::path::absolute(path)
+}
+
+/// Whether a folder could not be made since somebody else makes or removes it right now.
+pub fn is_passing(error: &io::Error) -> bool {
+    use io::ErrorKind::{AlreadyExists, NotFound, PermissionDenied};
+    matches!(error.kind(), NotFound | AlreadyExists | PermissionDenied)
+        || error.raw_os_error() == Some(ERROR_SHARING_VIOLATION as i32)
 }
 
 /// Why others could change what is in a folder; this system has no modes that would tell.
