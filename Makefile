@@ -35,9 +35,11 @@ VULKAN  := libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
 BROWSER := chromium
 # An emulator of 64-bit ARM, and a linker for it.
 EMULATOR := qemu-user gcc-aarch64-linux-gnu
+# Windows without Windows, and a linker for it.
+WINE := wine wine64 gcc-mingw-w64-x86-64
 
 .PHONY: demo help test check check-format format docs test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
-  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable vulkan browser llvm-cov \
+  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -139,9 +141,24 @@ test-aarch64: wheel $(VENV)/.dev ## physics, protocol, daemon and Python client 
 	rustup target add aarch64-unknown-linux-gnu
 	env -u PYO3_PYTHON $(CROSS) tests/aarch64/run.sh $(PYTHON)
 
-# For systems where daemons do not run, such as macOS.
-test-portable: ## physics, models and inverse kinematics alone
-	cargo test --release -p sim-physics -p sim-record -p sim-model -p sim-ik
+# Not part of `test`, which runs on Linux. Linux tries the module of macOS too, as far as it can.
+OTHERS   := aarch64-apple-darwin x86_64-pc-windows-msvc
+PORTABLE := -p sim-system -p sim-protocol -p sim-physics -p sim-record -p sim-model -p sim-ik
+AS_MACOS := $(if $(filter Linux,$(shell uname)),--features sim-system/macos-on-linux)
+test-portable: ## physics, models, inverse kinematics and protocol, with what macOS and Linux share
+	cargo test --release $(PORTABLE) $(AS_MACOS)
+
+check-systems: ## lints for macOS and Windows, from any system
+	rustup target add $(OTHERS)
+	for target in $(OTHERS); do \
+	  env -u PYO3_PYTHON cargo clippy --release --target $$target --quiet --workspace --lib --bins -- -D warnings && \
+	  env -u PYO3_PYTHON cargo clippy --release --target $$target --quiet --all-targets $(PORTABLE) -- -D warnings || exit 1; done
+
+# Not part of `test`: it installs Wine, and builds the protocol for Windows.
+test-windows: ## the protocol for Windows, under Wine
+	$(call debian,$(WINE),Wine and a linker for Windows)
+	rustup target add x86_64-pc-windows-gnu
+	tests/windows/run.sh
 
 # Builds the workspace a second time, with counters, into target/llvm-cov-target.
 coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## what the tests run, into out/coverage
