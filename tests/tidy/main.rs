@@ -84,6 +84,7 @@ fn sources() -> Vec<String> {
         "sim-daemon/client-c/src",
         "sim-daemon/protocol/src",
         "sim-daemon/picture/src",
+        "sim-daemon/system/src",
         "py-client/src",
     ]
     .iter()

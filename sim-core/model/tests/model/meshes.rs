@@ -256,6 +256,7 @@ fn relative_paths_climb_within_the_robots_folder_only() {
     assert_says(&error.to_string(), &["leaves the robot's folder"]);
 }
 
+#[cfg(unix)] // Windows lets few users make links
 #[test]
 fn symbolic_links_are_followed_as_installed_workspaces_need() {
     let package = Package::new("links");

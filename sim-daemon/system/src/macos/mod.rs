@@ -6,8 +6,15 @@
 pub mod clock;
 pub mod cores;
 pub mod memory;
-pub(crate) mod places;
+mod places;
 pub mod process;
 pub mod storage;
 
-pub use crate::unix::{faults, files, forks, open_files, signals, streams};
+pub use crate::unix::{faults, forks, open_files, signals, streams};
+
+pub mod files {
+    //! Files and folders of one user, locks on them, and where shared memory is.
+
+    pub use super::places::{SHARED_MEMORY_CURE, shared_memory};
+    pub use crate::unix::files::*;
+}

@@ -14,9 +14,7 @@ use rustix::fs::{Access, OFlags, access, fcntl_getfl, fcntl_setfl, statvfs};
 use rustix::io::Errno;
 use rustix::time::Timespec;
 
-pub use crate::system::places::{SHARED_MEMORY_CURE, shared_memory};
-
-/// The name of a folder of this user in [`shared_memory`].
+/// The name of a folder of this user in the folder of shared memory.
 pub fn own_folder_name() -> String {
     format!("tightloop-{}", rustix::process::getuid().as_raw())
 }
