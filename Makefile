@@ -145,7 +145,7 @@ test-aarch64: wheel $(VENV)/.dev ## physics, protocol, daemon and Python client 
 OTHERS   := aarch64-apple-darwin x86_64-pc-windows-msvc
 PORTABLE := -p sim-system -p sim-protocol -p sim-physics -p sim-record -p sim-model -p sim-ik
 AS_MACOS := $(if $(filter Linux,$(shell uname)),--features sim-system/macos-on-linux)
-test-portable: ## physics, models, inverse kinematics and protocol, with what macOS and Linux share
+test-portable: ## physics, models and inverse kinematics, and the protocol with the module of macOS
 	cargo test --release $(PORTABLE) $(AS_MACOS)
 
 check-systems: ## lints for macOS and Windows, from any system

@@ -165,7 +165,7 @@ class Snapshot:
 def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
     """Provide a file between client and daemon, in shared memory if possible.
 
-    How long it lives is told by `tightloop.system.exchange_file`.
+    `tightloop.system.exchange_file` says how long it lives.
 
     Args:
         daemon: Process id of the daemon.

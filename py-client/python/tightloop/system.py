@@ -1,4 +1,4 @@
-"""What differs between Linux, macOS and Windows. Alone in this package, it asks on which of them it runs."""
+"""What differs between Linux, macOS and Windows. No other module of this package asks which of them it runs on."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ impl Alarm {
         Alarm { margin: MARGIN_MIN }
     }
 
-    /// Sleeps until shortly before that time, so that the caller can look for what comes then. A signal ends it early.
+    /// Sleeps until shortly before that time, so that the caller can look for what comes then. On Linux a signal ends it early.
     pub(crate) fn sleep_until_shortly_before(&mut self, at: u64) {
         let until = at.saturating_sub(self.margin);
         if until <= now() {

@@ -78,7 +78,8 @@ impl Mapping {
         may_write: bool,
         (owner, is_made): (u64, bool),
     ) -> io::Result<Mapping> {
-        faults::replace_missing_pages(on_missing_page);
+        // SAFETY: it is true for pages of the files that are mapped here, whose readers check what they find.
+        unsafe { faults::replace_missing_pages(on_missing_page) };
         let mut options = MmapOptions::new();
         options.len(bytes);
         let pages = match may_write {

@@ -3,12 +3,12 @@
 //! ```text
 //! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session, how many groups if any
 //! ROOT/NAME.0.lock          of a daemon with groups: likewise for each of them, which has the rest below, too
-//! /dev/shm/tl<hash>/        nodes, services, sockets and shared memory, each session with a prefix of its own;
+//! SHARED/tl<hash>/            nodes, services, sockets and shared memory, each session with a prefix of its own;
 //!                           `place`, locked too, names ROOT and NAME; hash is over both
 //! ```
 //! All of it is for one user only: folders have mode 0700 and files 0600, whatever the umask. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
-//! Whoever can take the lock may remove the rest. The transport folder is in /dev/shm whatever ROOT is, since the path
-//! of a Unix socket is limited to 107 bytes.
+//! Whoever can take the lock may remove the rest. SHARED is `/dev/shm` on Linux, `/private/var/tmp` on macOS and the user's
+//! temporary folder on Windows, whatever ROOT is, since the path of a Unix socket is limited to 107 bytes.
 
 use std::fs::{self, File, Metadata};
 use std::io::ErrorKind;
@@ -64,7 +64,7 @@ pub enum Presence {
     Running(Beacon),
 }
 
-/// The root folder: `$TIGHTLOOP_ROOT`, else `$XDG_RUNTIME_DIR/tightloop`, else `/dev/shm/tightloop-<uid>`.
+/// The root folder: `$TIGHTLOOP_ROOT`, else `$XDG_RUNTIME_DIR/tightloop`, else a folder of this user in [`shared_memory`].
 pub fn default_root() -> PathBuf {
     // the stand-in is the root folder itself, which was found without it
     let session = variable(RUNTIME_FOLDER).filter(|folder| Some(folder) != STAND_IN.get());
@@ -112,10 +112,16 @@ impl DaemonPaths {
         {
             return Err(bad("it has a character that is not allowed"));
         }
+        if let Some(problem) = files::transport_problem() {
+            return Err(ProtocolError::Root {
+                path: shared_memory().into(),
+                problem: problem.to_owned(),
+            });
+        }
         let root = private_folder(&root.map_or_else(default_root, Path::to_owned))?;
         let mut hash = Fnv::new();
-        hash.text(&root.to_string_lossy());
-        hash.text(name);
+        hash.text(&files::folded(&root.to_string_lossy()));
+        hash.text(&files::folded(name));
         Ok(DaemonPaths {
             root,
             name: name.to_owned(),
@@ -218,7 +224,7 @@ impl DaemonPaths {
         let prefix = format!("{:08x}_", session as u32);
         let separator = std::path::MAIN_SEPARATOR;
         let folder = format!("{}{separator}{}{separator}", shared_memory(), self.stem);
-        // lengths: 28 + 9 bytes here, at most 45 more for a socket, 107 allowed
+        // lengths: on Linux 28 + 9 bytes here, on macOS 36 + 9; at most 45 more for a socket; 107 and 103 are allowed
         config.global.prefix =
             FileName::new(prefix.as_bytes()).expect("digits, letters and an underscore");
         config

@@ -33,17 +33,25 @@ pub(crate) enum Problem {
 
 /// What the system says, as it can be kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SystemError(i32);
+pub(crate) enum SystemError {
+    Code(i32),
+    /// Of an error that is none of the system's.
+    Kind(io::ErrorKind),
+}
 
 impl From<io::Error> for SystemError {
     fn from(error: io::Error) -> SystemError {
-        SystemError(error.raw_os_error().unwrap_or(0))
+        let kind = SystemError::Kind(error.kind());
+        error.raw_os_error().map_or(kind, SystemError::Code)
     }
 }
 
 impl From<SystemError> for io::Error {
     fn from(error: SystemError) -> io::Error {
-        io::Error::from_raw_os_error(error.0)
+        match error {
+            SystemError::Code(code) => io::Error::from_raw_os_error(code),
+            SystemError::Kind(kind) => kind.into(),
+        }
     }
 }
 
@@ -92,6 +100,22 @@ impl Problem {
             folder: folder.to_string_lossy().into_owned(),
             free: free_bytes(folder),
             needed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_keep_their_code_or_their_kind() {
+        for error in [
+            io::Error::from_raw_os_error(13),
+            io::ErrorKind::OutOfMemory.into(),
+        ] {
+            let text = error.to_string();
+            assert_eq!(io::Error::from(SystemError::from(error)).to_string(), text);
         }
     }
 }

@@ -11,7 +11,7 @@ use std::fmt::Debug;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::marker::PhantomData;
-use std::mem::MaybeUninit;
+use std::mem::{ManuallyDrop, MaybeUninit};
 use std::path::{Path as FilePath, PathBuf};
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -74,7 +74,7 @@ struct Data<T> {
 /// Shared memory that begins with a `T`.
 #[derive(Debug)]
 pub struct Storage<T: Content> {
-    mapping: Mapping,
+    mapping: ManuallyDrop<Mapping>,
     config: file::Configuration<T>,
     name: FileName,
     is_owned: AtomicBool,
@@ -96,6 +96,10 @@ impl<T: Content> Drop for Storage<T> {
         if self.has_ownership() {
             // SAFETY: the value was initialised before the file got its name, and its last owner drops it.
             unsafe { (*self.data()).value.assume_init_drop() };
+        }
+        // SAFETY: this is the only place that drops it. Windows removes no file that is mapped.
+        unsafe { ManuallyDrop::drop(&mut self.mapping) };
+        if self.has_ownership() {
             // somebody else may have removed it
             let _ = fs::remove_file(path(&self.config, &self.name));
         }
@@ -105,7 +109,7 @@ impl<T: Content> Drop for Storage<T> {
 impl<T: Content> Abandonable for Storage<T> {
     unsafe fn abandon_in_place(mut this: NonNull<Self>) {
         // SAFETY: the caller forgets the storage afterwards, so the mapping is dropped once.
-        unsafe { std::ptr::drop_in_place(&raw mut this.as_mut().mapping) };
+        unsafe { ManuallyDrop::drop(&mut this.as_mut().mapping) };
     }
 }
 
@@ -273,7 +277,7 @@ impl<T: Content> Builder<'_, T> {
         let mapping = Mapping::new(file.file(), bytes, true, whose)
             .map_err(|error| failed(Problem::System(error.into())))?;
         let storage = Storage {
-            mapping,
+            mapping: ManuallyDrop::new(mapping),
             config: self.config.clone(),
             name: self.name,
             is_owned: AtomicBool::new(false),
@@ -330,7 +334,7 @@ impl<T: Content> Builder<'_, T> {
             return Err(DynamicStorageOpenError::InternalError);
         };
         Ok(Storage {
-            mapping,
+            mapping: ManuallyDrop::new(mapping),
             config: self.config.clone(),
             name: self.name,
             is_owned: AtomicBool::new(false),

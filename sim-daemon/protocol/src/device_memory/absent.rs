@@ -1,4 +1,4 @@
-//! No driver of these systems gives memory to another process by descriptors: a request is refused.
+//! Only Linux shares device memory between processes: here each request is refused.
 
 use std::convert::Infallible;
 use std::time::Duration;

@@ -31,7 +31,10 @@ pub fn keep_to(cores: &[usize]) -> Result<(), String> {
     let mut set = CpuSet::new();
     for &core in cores {
         if core >= CpuSet::MAX_CPU {
-            return Err(format!("numbers end at {}", CpuSet::MAX_CPU - 1));
+            return Err(format!(
+                "core {core}: numbers end at {}",
+                CpuSet::MAX_CPU - 1
+            ));
         }
         set.set(core);
     }

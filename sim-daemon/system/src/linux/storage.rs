@@ -40,7 +40,7 @@ impl NewFile {
     ///
     /// # Errors
     /// Those of the system; the kind is `AlreadyExists` where another file has the name.
-    pub fn publish(self, path: &Path) -> io::Result<()> {
+    pub fn publish(&self, path: &Path) -> io::Result<()> {
         let made = format!("/proc/self/fd/{}", self.0.as_raw_fd());
         linkat(CWD, made, CWD, path, AtFlags::SYMLINK_FOLLOW)?;
         Ok(())

@@ -21,7 +21,11 @@ pub fn exists(pid: u32) -> bool {
 pub fn is_gone(pid: u32, _beside: u32) -> bool {
     let of_process = |process: &Process| process.status();
     let status = look(pid, ProcessRefreshKind::nothing(), of_process);
-    !exists(pid) || matches!(status, Some(ProcessStatus::Zombie | ProcessStatus::Dead))
+    // macOS tells nothing of a process that has only its exit code left
+    matches!(
+        status,
+        None | Some(ProcessStatus::Zombie | ProcessStatus::Dead)
+    )
 }
 
 /// Whether `parent`, which started this process, has ended.

@@ -9,7 +9,7 @@ use rustix::fs::{FallocateFlags, fallocate};
 
 use super::files::private;
 
-/// A file of this user that is not complete. Whoever is killed now leaves it; it goes with its folder.
+/// A file of this user that is not complete. A process that is killed here leaves the file; it goes with its folder.
 #[derive(Debug)]
 pub struct NewFile {
     file: File,
@@ -40,7 +40,7 @@ impl NewFile {
     ///
     /// # Errors
     /// Those of the system; the kind is `AlreadyExists` where another file has the name.
-    pub fn publish(self, path: &Path) -> io::Result<()> {
+    pub fn publish(&self, path: &Path) -> io::Result<()> {
         // renaming would replace the other file; the first name goes when this is dropped
         fs::hard_link(&self.path, path)
     }

@@ -5,24 +5,28 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicBool, AtomicPtr, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Says whether an address lies in a mapping whose missing pages become zeros. Called inside a handler of a signal: it
-/// allocates nothing and takes no lock.
-pub type IsMapped = fn(usize) -> bool;
+/// Takes note of a missing page at an address, and says whether zeros may replace it.
+pub type OnMissingPage = fn(usize) -> bool;
 
-static IS_MAPPED: OnceLock<IsMapped> = OnceLock::new();
+static ON_MISSING_PAGE: OnceLock<OnMissingPage> = OnceLock::new();
 /// What handled the signal before us, and whether a fault was handed on to it.
 static PREVIOUS: AtomicPtr<libc::sigaction> = AtomicPtr::new(null_mut());
 static HANDED_ON: AtomicBool = AtomicBool::new(false);
 
-/// Puts a page of zeros of this process alone in place of a missing page, where `is_mapped` says that it is ours. A fault at
-/// any other address goes to whoever handled the signal before.
+/// Puts a page of zeros of this process alone in place of a missing page, where `on_missing_page` says that it may. A fault
+/// at any other address goes to whoever handled the signal before.
 ///
-/// Call it again before each mapping: others, such as Python's `faulthandler`, may have put themselves before us.
-pub fn replace_missing_pages(is_mapped: IsMapped) {
+/// Call it again before each mapping: others, such as Python's `faulthandler`, may have put themselves before us. macOS does
+/// not tell a fault from a signal that somebody sent.
+///
+/// # Safety
+/// `on_missing_page` is true only for pages of mapped files that may become zeros. It runs in a handler of a signal, so it
+/// allocates nothing and takes no lock.
+pub unsafe fn replace_missing_pages(on_missing_page: OnMissingPage) {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     // one crate asks for it, always with the same function
-    let _ = IS_MAPPED.set(is_mapped);
+    let _ = ON_MISSING_PAGE.set(on_missing_page);
     let ours = on_bus_error as *const () as usize;
     // SAFETY: zero is a value of this plain struct, and the handler does only what a handler may.
     unsafe {
@@ -66,7 +70,7 @@ extern "C" fn on_bus_error(signal: i32, info: *mut libc::siginfo_t, _: *mut c_vo
 
 /// Puts zeros in place of the page at `address`, if it is one of ours.
 fn replace_page(address: usize) -> bool {
-    if !IS_MAPPED.get().is_some_and(|is_mapped| is_mapped(address)) {
+    if !ON_MISSING_PAGE.get().is_some_and(|noted| noted(address)) {
         return false;
     }
     let protection = libc::PROT_READ | libc::PROT_WRITE;

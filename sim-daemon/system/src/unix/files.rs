@@ -164,6 +164,11 @@ pub fn open_to_write(path: &Path, options: &mut OpenOptions) -> io::Result<File>
     Ok(file)
 }
 
+/// Why the transport cannot use the folder of shared memory, if it cannot.
+pub fn transport_problem() -> Option<&'static str> {
+    None
+}
+
 /// Whether this user may make files in a folder.
 pub fn is_writable(folder: &Path) -> bool {
     access(folder, Access::WRITE_OK | Access::EXEC_OK).is_ok()
@@ -174,8 +179,8 @@ pub fn free_bytes(folder: &Path) -> u64 {
     statvfs(folder).map_or(0, |status| status.f_bavail * status.f_frsize)
 }
 
-/// Waits until a socket can be read or the time is over, and says whether it can. A signal ends the wait early. None where
-/// the descriptor is none of the system's.
+/// Waits until a socket can be read or the time is over, and says whether it can. A signal ends the wait early. Returns
+/// `None` where the transport numbers its own descriptors.
 ///
 /// # Safety
 /// The descriptor stays open meanwhile.

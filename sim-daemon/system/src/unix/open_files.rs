@@ -6,6 +6,9 @@ use std::io;
 use rustix::io::Errno;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
+/// What macOS grants a process whose hard limit is none, from its `sys/syslimits.h`.
+const OPEN_MAX: u64 = 10_240;
+
 /// Files that this process may have open.
 pub fn limit() -> u64 {
     getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
@@ -13,7 +16,12 @@ pub fn limit() -> u64 {
 
 /// Files that this process has open; none where that cannot be counted.
 pub fn count() -> Option<u64> {
-    Some(fs::read_dir("/dev/fd").ok()?.count() as u64)
+    let mut folders = ["/proc/self/fd", "/dev/fd"].into_iter();
+    Some(
+        folders
+            .find_map(|folder| fs::read_dir(folder).ok())?
+            .count() as u64,
+    )
 }
 
 /// Raises the limit as far as this process may.
@@ -23,8 +31,15 @@ pub fn raise_limit() {
         current: limit.maximum,
         ..limit
     };
-    // where the hard limit is reached too, the file that cannot be opened tells
-    let _ = setrlimit(Resource::Nofile, raised);
+    if setrlimit(Resource::Nofile, raised).is_err() {
+        let most = limit.maximum.unwrap_or(u64::MAX).min(OPEN_MAX);
+        let raised = Rlimit {
+            current: limit.current.max(Some(most)),
+            ..limit
+        };
+        // where the hard limit is reached too, the file that cannot be opened tells
+        let _ = setrlimit(Resource::Nofile, raised);
+    }
 }
 
 /// Whether a call failed since too many files are open.

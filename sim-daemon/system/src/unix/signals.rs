@@ -43,7 +43,7 @@ pub fn set_priority(priority: u8) -> Result<(), String> {
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let value = priority
         .try_into()
-        .map_err(|_| "it is above 99".to_owned())?;
+        .map_err(|_| "(it is above 99)".to_owned())?;
     let value = ThreadPriority::Crossplatform(value);
     set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(|error| {
         format!(

@@ -1,7 +1,10 @@
 //! Missing pages of mapped files: Windows lets nobody cut a file that is mapped.
 
-/// Says whether an address lies in a mapping.
-pub type IsMapped = fn(usize) -> bool;
+/// Takes note of a missing page at an address, and says whether zeros may replace it.
+pub type OnMissingPage = fn(usize) -> bool;
 
 /// Replaces pages that are missing, of which there are none here.
-pub fn replace_missing_pages(_is_mapped: IsMapped) {}
+///
+/// # Safety
+/// None is needed here.
+pub unsafe fn replace_missing_pages(_on_missing_page: OnMissingPage) {}

@@ -25,20 +25,16 @@ const LOCKED: u32 = 1 << 30;
 const FOLDER_MAX: usize = 120;
 
 /// What to do when files cannot be made in the folder of shared memory.
-pub const SHARED_MEMORY_CURE: &str = "frames go through the temporary folder; set TEMP to one that is writable, of fewer than 120 \
-     letters of English";
+pub const SHARED_MEMORY_CURE: &str = "frames go through the temporary folder; set TEMP to one that is writable, \
+     with fewer than 120 characters, all of them ASCII";
 
-/// The folder of files that processes map: the user's temporary folder, where its name is one that the transport can use.
+/// The folder of files that processes map: the user's temporary folder.
 pub fn shared_memory() -> &'static str {
     static FOLDER: OnceLock<String> = OnceLock::new();
     FOLDER.get_or_init(|| {
         let folder = std::env::temp_dir();
         let folder = folder.to_string_lossy();
-        let folder = folder.trim_end_matches('\\');
-        match folder.is_ascii() && folder.len() < FOLDER_MAX {
-            true => folder.to_owned(),
-            false => "C:\\Windows\\Temp".to_owned(),
-        }
+        folder.trim_end_matches('\\').to_owned()
     })
 }
 
@@ -205,9 +201,22 @@ pub fn open_to_write(path: &Path, options: &mut OpenOptions) -> io::Result<File>
     options.open(path)
 }
 
+/// Why the transport cannot use [`shared_memory`], if it cannot: it opens files by names of single bytes.
+pub fn transport_problem() -> Option<&'static str> {
+    let folder = shared_memory();
+    (!folder.is_ascii() || folder.len() >= FOLDER_MAX)
+        .then_some("its name is too long, or has characters outside ASCII")
+}
+
+/// What tells names apart that name one file: the system ignores case.
+pub fn folded(name: &str) -> String {
+    name.to_lowercase()
+}
+
 /// Whether this user may make files in a folder.
 pub fn is_writable(folder: &Path) -> bool {
     fs::metadata(folder).is_ok_and(|folder| !folder.permissions().readonly())
+        && transport_problem().is_none()
 }
 
 /// Bytes free on the file system of a folder; 0 where that cannot be asked.
@@ -220,7 +229,7 @@ pub fn free_bytes(folder: &Path) -> u64 {
     if is_known == 0 { 0 } else { free }
 }
 
-/// Waits until a socket can be read. The transport's descriptors are its own here, so the answer is always none.
+/// Waits until a socket can be read. Returns `None`, since the transport numbers its own descriptors here.
 ///
 /// # Safety
 /// None is needed here.

@@ -35,7 +35,7 @@ pub fn keep_writing_in_the_background() {}
 pub fn set_priority(priority: u8) -> Result<(), String> {
     let value = priority
         .try_into()
-        .map_err(|_| "it is above 99".to_owned())?;
+        .map_err(|_| "(it is above 99)".to_owned())?;
     set_thread_priority(thread_native_id(), ThreadPriority::Crossplatform(value))
-        .map_err(|error| format!("({error:?}): run as administrator"))
+        .map_err(|error| format!("({error:?})"))
 }

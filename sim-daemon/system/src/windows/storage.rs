@@ -11,7 +11,7 @@ use windows_sys::Win32::Storage::FileSystem::{FILE_ATTRIBUTE_TEMPORARY, MoveFile
 
 use super::files::private;
 
-/// A file of this user that is not complete. Whoever is killed now leaves it; it goes with its folder.
+/// A file of this user that is not complete. A process that is killed here leaves the file; it goes with its folder.
 #[derive(Debug)]
 pub struct NewFile {
     file: File,
@@ -46,7 +46,7 @@ impl NewFile {
     ///
     /// # Errors
     /// Those of the system; the kind is `AlreadyExists` where another file has the name.
-    pub fn publish(self, path: &Path) -> io::Result<()> {
+    pub fn publish(&self, path: &Path) -> io::Result<()> {
         let wide =
             |path: &Path| -> Vec<u16> { path.as_os_str().encode_wide().chain([0]).collect() };
         // a file that is mapped may be renamed, but not removed
