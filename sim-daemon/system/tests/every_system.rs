@@ -66,13 +66,14 @@ fn a_process_is_there_until_it_ends_and_tells_its_age_and_memory() {
     ended.wait().unwrap();
     assert!(!process::exists(ended.id()) && process::is_gone(ended.id(), own));
     // nobody has asked for the exit code of this one
-    let unasked = child();
+    let mut unasked = child();
     let mut tries = 0;
     while !process::is_gone(unasked.id(), own) && tries < 500 {
         std::thread::sleep(Duration::from_millis(20));
         tries += 1;
     }
     assert!(process::is_gone(unasked.id(), own));
+    unasked.wait().unwrap();
     let age = process::age(own).unwrap();
     assert!(age < Duration::from_secs(3600), "{age:?}");
     let all = process::memory(own).unwrap();
