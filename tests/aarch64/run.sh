@@ -26,5 +26,20 @@ PYTHONPATH=examples "$python" tests/aarch64/record_lessons.py $folder/lessons
 for lesson in $folder/lessons/*.tlrec; do
   PYTHONPATH=$folder/site $folder/python -m tightloop replay "$lesson"
 done
-mapfile -t selected < <(grep -v '^#' tests/aarch64/python.txt)
-PYTHONPATH=$folder/site $folder/python -m pytest -c py-client/pyproject.toml --rootdir . -p no:cacheprovider -q "${selected[@]}"
+mapfile -t files < <(grep '\.py$' tests/aarch64/python.txt)
+mapfile -t options < <(grep '^--' tests/aarch64/python.txt)
+# an emulated test keeps one core busy, so two halves of the files run at once
+halves=()
+for half in 0 1; do
+  selected=()
+  for ((k = half; k < ${#files[@]}; k += 2)); do selected+=("${files[k]}"); done
+  PYTHONPATH=$folder/site $folder/python -m pytest -c py-client/pyproject.toml --rootdir . -p no:cacheprovider -q \
+    "${options[@]}" "${selected[@]}" > $folder/python-$half.log 2>&1 &
+  halves+=($!)
+done
+failed=0
+for half in 0 1; do
+  wait "${halves[half]}" || failed=1
+  cat $folder/python-$half.log
+done
+exit $failed

@@ -40,10 +40,10 @@ impl Drop for Folder {
     }
 }
 
-/// A process of this program that ends by itself after it printed the names of tests.
+/// A process that ends by itself.
 fn child() -> std::process::Child {
-    let mut command = Command::new(std::env::current_exe().unwrap());
-    command.arg("--list").stdout(Stdio::null()).spawn().unwrap()
+    let mut command = Command::new(if cfg!(windows) { "hostname" } else { "true" });
+    command.stdout(Stdio::null()).spawn().unwrap()
 }
 
 #[test]

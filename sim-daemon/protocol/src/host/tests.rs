@@ -213,10 +213,9 @@ fn a_client_that_goes_with_a_step_in_flight_makes_room_for_the_next() {
 #[test]
 fn a_holder_that_died_before_it_came_holds_nothing() {
     let fake = Fake::start("unborn");
-    // this program, which ends at once
-    let this = std::env::current_exe().unwrap();
-    let mut dead = std::process::Command::new(this);
-    let mut dead = dead.arg("--help").stdout(Stdio::null()).spawn().unwrap();
+    let program = if cfg!(windows) { "hostname" } else { "true" };
+    let mut dead = std::process::Command::new(program);
+    let mut dead = dead.stdout(Stdio::null()).spawn().unwrap();
     dead.wait().unwrap();
     assert!(fake.attach().ask_for_lease(dead.id()));
     fake.attach().step(&[], &mut keep_waiting()).unwrap();
