@@ -349,7 +349,7 @@ pub const DOORS: [(&str, &str); 21] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 47] = [
+pub const UNSAFE: [&str; 48] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/memory.rs",               // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
@@ -394,6 +394,7 @@ pub const UNSAFE: [&str; 47] = [
     "sim-daemon/system/src/unix/forks.rs", // a handler of forks
     "sim-daemon/system/src/windows/clock.rs", // calls of Windows
     "sim-daemon/system/src/windows/cores.rs", // as clock.rs
+    "sim-daemon/system/src/windows/faults.rs", // the same function, which does nothing
     "sim-daemon/system/src/windows/files.rs", // as clock.rs
     "sim-daemon/system/src/windows/process.rs", // as clock.rs
     "sim-daemon/system/src/windows/storage.rs", // as clock.rs
