@@ -145,8 +145,9 @@ test-aarch64: wheel $(VENV)/.dev ## physics, protocol, daemon and Python client 
 OTHERS   := aarch64-apple-darwin x86_64-pc-windows-msvc
 PORTABLE := -p sim-system -p sim-protocol -p sim-physics -p sim-record -p sim-model -p sim-ik
 AS_MACOS := $(if $(filter Linux,$(shell uname)),--features sim-system/macos-on-linux)
+TEST_PORTABLE := cargo test --release $(PORTABLE) $(AS_MACOS)
 test-portable: ## physics, models and inverse kinematics, and the protocol with the module of macOS
-	cargo test --release $(PORTABLE) $(AS_MACOS)
+	$(TEST_PORTABLE)
 
 check-systems: ## lints for macOS and Windows, from any system
 	rustup target add $(OTHERS)
