@@ -24,7 +24,7 @@ from tightloop.errors import SceneError
 WORLDS = 8
 # Relative to the largest acceleration of a world; with contacts the second counts
 TOLERANCES = (1e-8, 1e-6)
-PRIMITIVES = ("PLANE", "SPHERE", "CAPSULE")
+PRIMITIVES = ("PLANE", "SPHERE", "CAPSULE", "BOX")
 # Accelerations of a mass matrix that cannot be inverted, in MuJoCo itself [m/s²].
 SINGULAR = 1e12
 

@@ -31,13 +31,12 @@ fn plane(_: &mut Random) -> Shape {
     Shape::Plane
 }
 
-const ROUND: [[Kind; 2]; 6] = [
+const ROUND: [[Kind; 2]; 5] = [
     [sphere, sphere],
     [sphere, capsule],
     [sphere, cuboid],
     [capsule, capsule],
     [capsule, cuboid],
-    [cuboid, cuboid],
 ];
 const ON_PLANE: [[Kind; 2]; 4] = [
     [plane, sphere],
@@ -138,6 +137,30 @@ fn nearest_points_are_parrys() {
         assert!(refuted < CONFIGURATIONS / 200, "{refuted}");
         assert!(classes[0] > 1000 && classes[1] > 300, "{classes:?}");
     }
+}
+
+#[test]
+fn boxes_that_overlap_are_pushed_out_a_twentieth_beyond_the_short_way_at_most() {
+    let mut random = Random(6);
+    let pairs = random_pairs(&mut random, [cuboid, cuboid], CONFIGURATIONS);
+    let mut overlapping = 0;
+    for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
+        let size = reach(pair.shapes[0]) + reach(pair.shapes[1]);
+        let (distance, _) = oracle(pair);
+        for point in &found {
+            let shown = separation(pair, point.normal);
+            assert!(point.distance > shown - DISTANCE * size, "{point:?} {pair:?}");
+        }
+        // apart, an axis that separates them is not the way between their nearest points
+        if distance > -0.01 * size {
+            continue;
+        }
+        overlapping += 1;
+        // a face is kept where an edge is a twentieth better; parry's depth is good to a hundredth where it is deep
+        let shown = separation(pair, nearest(&found).normal);
+        assert!(shown > distance * 1.07, "{found:?} {distance} {pair:?}");
+    }
+    assert!(overlapping > 1000, "{overlapping}");
 }
 
 #[test]

@@ -73,15 +73,16 @@ pub(super) struct Piece {
 }
 
 /// Most contacts of two shapes: end points and the nearest point between them, or corners of the area that two faces
-/// share, for boxes with the nearest vertex.
+/// share.
 pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
     match kinds {
         (Kind::Field, _) => FIELD_CONTACTS,
         (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
         (Kind::Plane, Kind::Capsule) => 2,
+        (Kind::Capsule, Kind::Capsule) => 2,
         (Kind::Capsule, _) => 3,
         (Kind::Plane, Kind::Cylinder) => 5,
-        (Kind::Box, Kind::Box) => 9,
+        (Kind::Box, Kind::Box) => 8,
         _ => 4,
     }
 }

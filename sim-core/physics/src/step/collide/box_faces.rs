@@ -88,12 +88,12 @@ impl<F: Num> FacePair<F> {
         }
     }
 
-    /// Adds the points of the incident face clipped to the reference rectangle, and returns their least distance.
+    /// Adds the points of the incident face clipped to the reference rectangle.
     ///
     /// There are twelve candidates: where each incident edge enters, where it leaves if it was cut, and the corners of the
     /// reference face inside the incident one.
     #[inline(always)]
-    pub fn add_clipped<C: Cx<F = F>>(&self, cx: &mut C, margin: F, out: &mut Points<C>) -> F {
+    pub fn add_clipped<C: Cx<F = F>>(&self, cx: &mut C, margin: F, out: &mut Points<C>) {
         let c = F::c;
         let one = c(1.0);
         let [hu, hv] = self.sides;
@@ -103,7 +103,6 @@ impl<F: Num> FacePair<F> {
         let (wide_u, wide_v) = (hu.fma(wider, hu), hv.fma(wider, hv));
         let [e1, e2] = self.edges;
         let middle = self.middle;
-        let mut least = c(1e9);
         for (across, run, sense) in [(e2, e1, -1.0), (e1, e2, 1.0)] {
             let (x, y) = (reciprocal(run[0]), reciprocal(run[1]));
             let (wx, wy) = (wide_u * x.abs(), wide_v * y.abs());
@@ -120,8 +119,8 @@ impl<F: Num> FacePair<F> {
                 };
                 let is_cut = inside & is_cut;
                 let (enter, leave) = (run.scale_add(enter, start), run.scale_add(leave, start));
-                least = self.add(cx, inside & enter[2].lt(margin), enter, least, out);
-                least = self.add(cx, is_cut & leave[2].lt(margin), leave, least, out);
+                self.add(cx, inside & enter[2].lt(margin), enter, out);
+                self.add(cx, is_cut & leave[2].lt(margin), leave, out);
             }
         }
         // corners of the reference face in the coordinates of the incident one (Cramer's rule)
@@ -133,25 +132,16 @@ impl<F: Num> FacePair<F> {
             let inside = along1.abs().lt(interior) & along2.abs().lt(interior);
             let height = along1.fma(e1[2], along2.fma(e2[2], middle[2]));
             let at = Vec3([x, y, height]);
-            least = self.add(cx, inside & height.lt(margin), at, least, out);
+            self.add(cx, inside & height.lt(margin), at, out);
         }
-        least
     }
 
-    /// Adds a point above the reference face, and returns the lesser of its distance and `least`.
+    /// Adds a point above the reference face.
     #[inline(always)]
-    fn add<C: Cx<F = F>>(
-        &self,
-        cx: &mut C,
-        mask: MaskOf<C>,
-        at: Vec3<F>,
-        least: F,
-        out: &mut Points<C>,
-    ) -> F {
+    fn add<C: Cx<F = F>>(&self, cx: &mut C, mask: MaskOf<C>, at: Vec3<F>, out: &mut Points<C>) {
         // half-way between the faces
         let up = self.outwards.scale_add(at[2] * F::c(0.5), self.origin);
         let position = self.axes[0].scale_add(at[0], self.axes[1].scale_add(at[1], up));
         out.add(cx, mask, position, at[2], self.normal);
-        F::select(mask, least.min(at[2]), least)
     }
 }

@@ -6,33 +6,33 @@
 //! ```
 //!
 //! - Face axis: that face is the reference, and the most opposite face of the other box is clipped to its rectangle.
-//! - Edge axis: one point, between the edges.
-//! - Apart, with no point that attains the separation: the closest features are a vertex of one box and any feature of the
-//!   other, since the closest points of two edges lie along one of the axes above.
+//! - Edge axis: one point, between the edges. A face is kept where it is nearly as good and nearly the same axis
+//!   ([`SAME_AXIS`], [`LITTLE`]).
+//!
+//! Boxes apart whose faces share no area have no point, although a vertex may be within the margin.
 
 use super::box_faces::FacePair;
 use super::narrow::ShapePair;
 use super::points::Points;
-use super::select::{clamp_to_box, column_at, component_at, select, sign, transpose, zero_at};
+use super::select::{column_at, component_at, sign, transpose, zero_at};
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
-use crate::{times, when};
+use crate::when;
 
 /// How much the separation along a face of B must exceed that along the faces of A, in roundings of the boxes' size: the
 /// reference face must not switch between parallel faces.
 const PREFER_FIRST: f64 = 4.0;
-/// The same for edges against faces, relative to the boxes' size, before division by the length of the axis: noise grows as
-/// edges become parallel.
-const PREFER_FACES: f64 = 4e-7;
-/// Squared sine below which edges are parallel.
-const PARALLEL: f64 = 1e-8;
-/// 1 - cosine below which faces, and an edge axis to them, are flat on each other. A face is kept then, as MuJoCo keeps it at
-/// any angle: one point in its place would let the box rock.
-const FLAT: f64 = 2e-4;
-/// Part of the separation by which an edge axis must exceed that of flat faces.
-const FLAT_GAIN: f64 = 0.05;
-/// Faces farther apart than this, relative to the boxes' size, do not touch soon: there the nearest points are exact.
-const FLAT_APART: f64 = 0.02;
+/// The same for edges against faces, before division by the length of the axis: noise grows as edges become parallel.
+const PREFER_FACES: f64 = 4.0;
+/// Sine, in roundings, below which edges are parallel.
+const PARALLEL: f64 = 840.0;
+/// Cosine between an edge axis and the face axis above which they count as one: a face is kept if it is nearly as good, or one
+/// point in place of several would let the box rock (MuJoCo 3.17).
+const SAME_AXIS: f64 = 0.99;
+/// Part of the face's separation by which that of an edge must exceed it then.
+const LITTLE: f64 = 0.05;
+/// The same absolutely [m], for faces that just touch.
+const LEAST: f64 = 1e-15;
 
 /// The axis of largest separation.
 pub struct BoxAxis<F: Num> {
@@ -50,9 +50,7 @@ pub struct BoxAxis<F: Num> {
     pub pair: [F; 2],
     /// Its unit vector towards B, in the axes of A.
     pub product: Vec3<F>,
-    /// Separation along the better of both [m]; 0 where flat faces are kept although an edge is better.
-    pub separation: F,
-    /// For an edge axis, one over the length of its cross product, else 1.
+    /// One over the length of its cross product.
     pub inverse: F,
 }
 
@@ -62,10 +60,9 @@ fn size<F: Num>(a: Vec3<F>, b: Vec3<F>) -> F {
     (a[0] + a[1] + a[2]) + (b[0] + b[1] + b[2])
 }
 
-/// Two boxes: up to eight points of two faces, or one point of two edges or of a vertex.
+/// Two boxes: up to eight points of two faces, or one point of two edges.
 #[inline(always)]
 pub fn box_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let c = C::F::c;
     let (half_a, half_b, margin) = (pair.a.half_extents(), pair.b.half_extents(), pair.margin);
     let faces = FaceAxis::of(pair);
     when!(cx, !margin.lt(faces.separation), {
@@ -74,23 +71,11 @@ pub fn box_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) 
         let far = (margin * margin * edge.square).lt(edge.score);
         when!(cx, !far, {
             let best = best_axis(&faces, &edge, half_a, half_b);
-            let mut least = cx.var(c(1e9));
             when!(cx, !best.edge, {
-                let faces = FacePair::of(pair, &best);
-                let nearest = faces.add_clipped(cx, margin, out);
-                cx.set(&mut least, nearest);
+                FacePair::of(pair, &best).add_clipped(cx, margin, out);
             });
             when!(cx, best.edge, {
-                let nearest = add_edge_contact(cx, pair, &best, out);
-                cx.set(&mut least, nearest);
-            });
-            // rounding may leave this much between the separation and the point that attains it
-            let noise = c(16.0 * <C::F as Num>::Real::EPSILON) * size(half_a, half_b);
-            let reach = noise.fma(best.inverse, best.separation);
-            let apart = c(0.0).lt(best.separation) & reach.lt(cx.get(&least));
-            when!(cx, apart, {
-                let nearest = cx.get(&least).min(margin);
-                add_vertex_contact(cx, pair, &best, nearest, out);
+                add_edge_contact(cx, pair, &best, out);
             });
         });
     });
@@ -172,7 +157,8 @@ impl<F: Num> EdgeAxis<F> {
         // separation x over length √l is compared by x|x| l' > x'|x'| l
         let mut score = faces.separation * faces.separation.abs();
         let (mut square, mut code) = (c(1.0), c(-1.0));
-        let noise = size(half_a, half_b) * c(PREFER_FACES);
+        let noise = size(half_a, half_b) * c(PREFER_FACES * F::Real::EPSILON);
+        let parallel = PARALLEL * F::Real::EPSILON;
         for i in 0..3 {
             let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
             for j in 0..3 {
@@ -185,7 +171,7 @@ impl<F: Num> EdgeAxis<F> {
                 let of_b = half_b[j1].fma(widths[i][j2], half_b[j2].fma(widths[i][j1], of_a));
                 let x = between - of_b;
                 let here = x * x.abs();
-                let better = c(PARALLEL).lt(l) & (score * l).lt(here * square);
+                let better = c(parallel * parallel).lt(l) & (score * l).lt(here * square);
                 score = F::select(better, here, score);
                 square = F::select(better, l, square);
                 code = F::select(better, c((3 * i + j) as f64), code);
@@ -214,7 +200,8 @@ fn best_axis<F: Num>(
     // what the search took off for noise is added again
     let root = edge.score.abs().sqrt();
     let less = F::select(edge.score.lt(c(0.0)), -root, root);
-    let separation = size(half_a, half_b).fma(c(PREFER_FACES), less) * inverse;
+    let noise = size(half_a, half_b) * c(PREFER_FACES * F::Real::EPSILON);
+    let separation = (less + noise) * inverse;
     let first = F::select(
         c(5.5).lt(edge.code),
         c(2.0),
@@ -236,17 +223,10 @@ fn best_axis<F: Num>(
     let index = faces.code - F::select(of_b, c(3.0), c(0.0));
     let facing = column_at(index, columns);
     let along_face = F::select(of_b, product.dot(facing), component_at(index, product));
-    // the other box's axes along the face axis
-    let theirs = select(of_b, facing, column_at(index, cosines));
-    let parallel = theirs[0].abs().max(theirs[1].abs()).max(theirs[2].abs());
-    let flat = c(1.0 - FLAT).lt(parallel.min(along_face.abs()));
-    let little = (separation - faces.separation).lt(faces.separation.abs() * c(FLAT_GAIN));
-    let close = faces.separation.lt(size(half_a, half_b) * c(FLAT_APART));
-    let found = c(-0.5).lt(edge.code);
-    let is_flat = found & close & (flat & little);
-    let is_edge = found & !is_flat;
-    // faces that are kept count as touching, so no vertex is looked for
-    let face = F::select(is_flat, c(0.0), faces.separation);
+    let same = c(SAME_AXIS).lt(along_face.abs());
+    let least = faces.separation.abs().fma(c(LITTLE), c(LEAST));
+    let little = separation.lt(faces.separation + least);
+    let is_edge = c(-0.5).lt(edge.code) & !(same & little);
     BoxAxis {
         cosines,
         center: faces.center,
@@ -255,20 +235,19 @@ fn best_axis<F: Num>(
         edge: is_edge,
         pair,
         product,
-        separation: F::select(is_edge, separation, face),
-        inverse: F::select(is_edge, inverse, c(1.0)),
+        inverse,
     }
 }
 
-/// Adds the contact of the edges of an edge axis, half-way between their closest points (Ericson 2005, section 5.1.9).
-/// Returns its distance.
+/// Adds the contact of the edges of an edge axis: half-way between their closest points (Ericson 2005, section 5.1.9), with
+/// the distance and the normal of the axis, also where the lines are closest past an end.
 #[inline(always)]
 fn add_edge_contact<C: Cx>(
     cx: &mut C,
     pair: &ShapePair<'_, C>,
     best: &BoxAxis<C::F>,
     out: &mut Points<C>,
-) -> C::F {
+) {
     let c = C::F::c;
     let (axes_a, b) = (pair.axes_a, pair.pose_b);
     let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
@@ -285,114 +264,22 @@ fn add_edge_contact<C: Cx>(
     }
     let apart = columns.mul_add(Vec3(other), best.center[0]) - Vec3(a);
     let distance = apart.dot(normal);
-    // a + x aᵢ and apart + y bⱼ: the shortest way between the lines
+    // a + x aᵢ and apart + y bⱼ: the shortest way between the lines, clamped to the edges one after the other
     let run = column_at(best.pair[1], columns);
     let along_a = component_at(best.pair[0], apart);
     let along_b = apart.dot(run);
     let cosine = component_at(best.pair[0], run);
-    let factor = best.inverse * best.inverse;
-    let x = cosine.fnma(along_b, along_a) * factor;
-    let y = cosine.fma(along_a, -along_b) * factor;
     let long_a = component_at(best.pair[0], half_a);
     let long_b = component_at(best.pair[1], half_b);
-    let over = long_a.lt(x.abs()) | long_b.lt(y.abs());
-    let (x, y) = (x.min(long_a).max(-long_a), y.min(long_b).max(-long_b));
+    let free = cosine.fnma(along_b, along_a) * (best.inverse * best.inverse);
+    let x = free.min(long_a).max(-long_a);
+    let y = cosine.fma(x, -along_b).min(long_b).max(-long_b);
+    let x = cosine.fma(y, along_a).min(long_a).max(-long_a);
     let first = column_at(best.pair[0], *axes_a);
     let second = column_at(best.pair[1], b.axes);
     let on_a = first.scale_add(x, axes_a * Vec3(a));
     let on_b = second.scale_add(y, b.axes.mul_add(Vec3(other), b.center));
     let at = (on_a + on_b) * c(0.5);
-    // past an end the edges do not face each other: another feature is nearest, unless the boxes overlap
-    let found = distance.lt(pair.margin) & !(over & c(0.0).lt(distance));
-    out.add(cx, found, at, distance, axes_a * normal);
-    C::F::select(found, distance, c(1e9))
-}
-
-/// Adds the contact of the vertex of either box that is nearest to the other box, if it is nearer than `nearest`.
-#[inline(always)]
-fn add_vertex_contact<C: Cx>(
-    cx: &mut C,
-    pair: &ShapePair<'_, C>,
-    best: &BoxAxis<C::F>,
-    nearest: C::F,
-    out: &mut Points<C>,
-) {
-    let c = C::F::c;
-    let mut square = cx.var(nearest * nearest);
-    let mut middles = [cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0))];
-    let mut between = [cx.var(c(0.0)), cx.var(c(0.0)), cx.var(c(0.0))];
-    times!(cx, i in 8, {
-        // binary digits of the index are the signs of a corner
-        let i = cx.number(i);
-        let (high, i) = bit(i, 4.0);
-        let (middle, i) = bit(i, 2.0);
-        let (low, _) = bit(i, 1.0);
-        for of_b in [true, false] {
-            let (middle, apart) = nearest_to_vertex(pair, best, [low, middle, high], of_b);
-            let new = apart.dot(apart);
-            let better = new.lt(cx.get(&square));
-            let kept = C::F::select(better, new, cx.get(&square));
-            cx.put(&mut square, kept);
-            for k in 0..3 {
-                let kept = C::F::select(better, middle[k], cx.get(&middles[k]));
-                cx.put(&mut middles[k], kept);
-                let kept = C::F::select(better, apart[k], cx.get(&between[k]));
-                cx.put(&mut between[k], kept);
-            }
-        }
-    });
-    let mut at = Vec3::zero();
-    let mut apart = at;
-    for k in 0..3 {
-        at[k] = cx.get(&middles[k]);
-        apart[k] = cx.get(&between[k]);
-    }
-    let distance = apart.dot(apart).sqrt();
-    let normal = apart * c(1.0).div(distance);
-    out.add(cx, c(0.0).lt(distance), at, distance, normal);
-}
-
-/// The middle between a vertex of either box and the nearest point of the other, and the way from A to B between them.
-#[inline(always)]
-fn nearest_to_vertex<C: Cx>(
-    pair: &ShapePair<'_, C>,
-    best: &BoxAxis<C::F>,
-    corner: [C::F; 3],
-    of_b: bool,
-) -> (Vec3<C::F>, Vec3<C::F>) {
-    let c = C::F::c;
-    let (axes_a, b) = (pair.axes_a, pair.pose_b);
-    let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
-    let [in_a, in_b] = best.center;
-    let into_b = best.cosines;
-    let into_a = transpose(&best.cosines);
-    let (half, box_half) = if of_b {
-        (half_b, half_a)
-    } else {
-        (half_a, half_b)
-    };
-    let local = [
-        corner[0] * half[0],
-        corner[1] * half[1],
-        corner[2] * half[2],
-    ];
-    let vertex = match of_b {
-        true => into_a.mul_add(Vec3(local), in_a),
-        false => (into_b * Vec3(local)) - in_b,
-    };
-    let clamped = clamp_to_box(vertex, box_half);
-    let apart = vertex - clamped;
-    let middle = apart.scale_add(c(0.5), clamped);
-    match of_b {
-        true => (axes_a * middle, axes_a * apart),
-        false => (b.axes.mul_add(middle, b.center), (b.axes * apart) * c(-1.0)),
-    }
-}
-
-/// The sign of a binary digit of a whole scalar, and the scalar without it.
-#[inline(always)]
-fn bit<F: Num>(number: F, value: f64) -> (F, F) {
-    let set = F::c(value - 0.5).lt(number);
-    let sign = F::select(set, F::c(1.0), F::c(-1.0));
-    (sign, F::select(set, number - F::c(value), number))
+    let touches = distance.lt(pair.margin);
+    out.add(cx, touches, at, distance, axes_a * normal);
 }

@@ -6,14 +6,16 @@
 use super::narrow::ShapePair;
 use super::points::Points;
 use super::select::{
-    clamp_to_box, column_at, component_at, only_at, reciprocal, select, sign, zero_at,
+    clamp_to_box, column_at, component_at, only_at, reciprocal, sign, with_sign, zero_at,
 };
 use super::spheres::{Ball, BoxExit, add_sphere_box, add_sphere_sphere};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
 use crate::when;
 
-/// Sine below which axes are parallel, or perpendicular to a normal: two points are given then, or one end would rock.
+/// Sine below which the axes of two capsules are parallel: two points are given then (MuJoCo 3.17).
+const PARALLEL_AXES: f64 = 1e-4;
+/// Sine below which an axis is perpendicular to a normal: two points are given then, or one end would rock.
 const PARALLEL: f64 = 0.01;
 /// How much nearer, in roundings of the shapes' size, the nearest point must be than those of the ends to be a point of its
 /// own.
@@ -31,7 +33,7 @@ const PREFER_FACES: f64 = 4e-7;
 const PARALLEL_EDGE: f64 = 1e-8;
 
 /// Two capsules: the spheres around the closest points of their axes (Ericson 2005, section 5.1.9), or, where the axes are
-/// parallel, around the ends of their overlap.
+/// parallel, around the ends of their overlap. Without an overlap both ends are the same.
 #[inline(always)]
 pub fn capsule_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let c = C::F::c;
@@ -43,47 +45,28 @@ pub fn capsule_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
     let cosine = a.dot(d);
     let product = a.cross(d);
     let square = product.dot(product);
-    let parallel = square.lt(c(PARALLEL * PARALLEL));
-    let safe = C::F::select(c(1e-12).lt(square), square, one);
-
-    // closest points of the lines, clamped to the segments one after the other
-    let free = center.cross(d).dot(product).div(safe);
-    let x = free.min(half_height_a).max(-half_height_a);
-    let y = clamped_height(cosine, x, -along_b, half_height_b);
-    let x = clamped_height(cosine, y, along_a, half_height_a);
-    let nearest = [a * x, d.scale_add(y, center)];
-
-    // the ends of the overlap of parallel axes; without an overlap both are the nearest end
-    let reach = half_height_b * cosine.abs();
-    let low = (along_a - reach).max(-half_height_a).min(half_height_a);
-    let high = (along_a + reach).min(half_height_a).max(-half_height_a);
-    let common = parallel & (low + c(SAME) * half_height_a).lt(high);
-    let beside = select(
-        c(1e-12).lt(square),
-        product * one.div(safe.sqrt()),
-        axes_a[0],
-    );
-    let mut least = c(1e9);
-    let mut ends = [nearest; 2];
-    for (end, at) in ends.iter_mut().zip([low, high]) {
-        let y = clamped_height(cosine, at, -along_b, half_height_b);
-        *end = [a * at, d.scale_add(y, center)];
-        let between = end[1] - end[0];
-        least = least.min(between.dot(between).sqrt());
-    }
-
-    // the nearest point is alone, or is added to the ends where it is nearer than both
-    let size = pair.a.radius() + pair.b.radius() + half_height_a + half_height_b;
-    let between = nearest[1] - nearest[0];
-    let middle =
-        (between.dot(between).sqrt() + size * c(NEARER * <C::F as Num>::Real::EPSILON)).lt(least);
-    let alone = !common | middle;
-    when!(cx, alone, {
-        add_balls(cx, pair, nearest, beside, out);
+    let parallel = square.lt(c(PARALLEL_AXES * PARALLEL_AXES));
+    when!(cx, !parallel, {
+        // closest points of the lines, clamped to the segments one after the other
+        let square = C::F::select(parallel, one, square);
+        let free = center.cross(d).dot(product).div(square);
+        let x = free.min(half_height_a).max(-half_height_a);
+        let y = clamped_height(cosine, x, -along_b, half_height_b);
+        let x = clamped_height(cosine, y, along_a, half_height_a);
+        add_balls(cx, pair, [a * x, d.scale_add(y, center)], out);
     });
-    when!(cx, common, {
-        for end in ends {
-            add_balls(cx, pair, end, beside, out);
+    when!(cx, parallel, {
+        // each end of the overlap is an end of one axis, and the nearest point of the other
+        let reach = half_height_b * cosine.abs();
+        for side in [-1.0, 1.0] {
+            let end_b = c(side).fma(reach, along_a);
+            let of_b = end_b.abs().lt(half_height_a);
+            let end_a = end_b.min(half_height_a).max(-half_height_a);
+            let y = clamped_height(cosine, end_a, -along_b, half_height_b);
+            let y = C::F::select(of_b, with_sign(half_height_b, cosine * c(side)), y);
+            let x = clamped_height(cosine, y, along_a, half_height_a);
+            let x = C::F::select(of_b, x, end_a);
+            add_balls(cx, pair, [a * x, d.scale_add(y, center)], out);
         }
     });
 }
@@ -100,7 +83,6 @@ fn add_balls<C: Cx>(
     cx: &mut C,
     pair: &ShapePair<'_, C>,
     [p, q]: [Vec3<C::F>; 2],
-    beside: Vec3<C::F>,
     out: &mut Points<C>,
 ) {
     let a = Ball {
@@ -111,7 +93,7 @@ fn add_balls<C: Cx>(
         center: q,
         radius: pair.b.radius(),
     };
-    add_sphere_sphere(cx, &a, &b, beside, pair.margin, out);
+    add_sphere_sphere(cx, pair, &a, &b, out);
 }
 
 /// Capsule and box: the sphere around the point of the axis that is nearest to the box, and those around the ends of the

@@ -8,6 +8,10 @@ use super::select::{clamp_to_box, column_at, min_component, select, sign};
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::vec3::{Mat3, Vec3};
 
+/// Centres this near coincide [m], and axes with this sine are parallel [–]: the normal is then across both shapes' axes z, or
+/// the world's x where these are parallel (MuJoCo: `mjraw_SphereSphere`).
+const COINCIDENT: f64 = 1e-15;
+
 /// A sphere, or one that a capsule's axis carries.
 pub struct Ball<F> {
     /// Its centre [m].
@@ -16,27 +20,30 @@ pub struct Ball<F> {
     pub radius: F,
 }
 
-/// Adds the contact of two spheres; `fallback` is the normal where their centres coincide.
+/// Adds the contact of two spheres that the shapes of a pair carry.
 #[inline(always)]
 pub fn add_sphere_sphere<C: Cx>(
     cx: &mut C,
+    pair: &ShapePair<'_, C>,
     a: &Ball<C::F>,
     b: &Ball<C::F>,
-    fallback: Vec3<C::F>,
-    margin: C::F,
     out: &mut Points<C>,
 ) {
-    let c = C::F::c;
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let nothing = C::F::c(COINCIDENT * COINCIDENT);
     let between = b.center - a.center;
-    let square = between.dot(between);
-    let apart = c(0.0).lt(square);
-    let length = square.sqrt();
-    let inverse = c(1.0).div(C::F::select(apart, length, c(1.0)));
-    let normal = select(apart, between * inverse, fallback);
-    let distance = length - a.radius - b.radius;
+    let apart = nothing.lt(between.dot(between));
+    // any normal will do where centres coincide
+    let across = pair.axes_a[2].cross(pair.pose_b.axes[2]);
+    let turned = nothing.lt(across.dot(across));
+    let any = select(turned, across, Vec3([one, zero, zero]));
+    let way = select(apart, between, any);
+    let length = way.dot(way).sqrt();
+    let normal = way * one.div(length);
+    let distance = C::F::select(apart, length, zero) - a.radius - b.radius;
     // half-way between the surfaces
-    let at = normal.scale_add(distance.fma(c(0.5), a.radius), a.center);
-    out.add(cx, distance.lt(margin), at, distance, normal);
+    let at = normal.scale_add(distance.fma(C::F::c(0.5), a.radius), a.center);
+    out.add(cx, distance.lt(pair.margin), at, distance, normal);
 }
 
 /// The first shape of a pair as a ball.
@@ -51,12 +58,11 @@ fn ball_a<C: Cx>(pair: &ShapePair<'_, C>) -> Ball<C::F> {
 /// Two spheres: one point.
 #[inline(always)]
 pub fn sphere_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let up = Vec3([C::F::c(0.0), C::F::c(0.0), C::F::c(1.0)]);
     let b = Ball {
         center: pair.pose_b.center,
         radius: pair.b.radius(),
     };
-    add_sphere_sphere(cx, &ball_a(pair), &b, up, pair.margin, out);
+    add_sphere_sphere(cx, pair, &ball_a(pair), &b, out);
 }
 
 /// Sphere and capsule: one point, of the sphere around the point of the capsule's axis that is nearest.
@@ -70,7 +76,7 @@ pub fn sphere_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poin
         center: b.axes[2].scale_add(along, b.center),
         radius: pair.b.radius(),
     };
-    add_sphere_sphere(cx, &ball_a(pair), &nearest, b.axes[0], pair.margin, out);
+    add_sphere_sphere(cx, pair, &ball_a(pair), &nearest, out);
 }
 
 /// Sphere and box: one point. A centre inside the box leaves through the nearest face.
