@@ -162,6 +162,14 @@ pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
     }
 }
 
+/// The same, with the points of MuJoCo where it has a rule of its own.
+pub fn shapes_as_mujoco() -> Case {
+    let mut case = shapes(Cone::Elliptic, None);
+    case.name = "as MuJoCo";
+    case.m.contacts.mujoco_capsule_boxes = true;
+    case
+}
+
 /// A body with one shape of every kind on a height field, and a scan of the ground below it.
 pub fn fields() -> Case {
     let model = every_shape_on_a_field().compile().unwrap();

@@ -274,6 +274,7 @@ impl Model {
             .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
             .replace(", scans: []", "")
             .replace(", turns: None", "")
+            .replace(", mujoco_capsule_boxes: false", "")
             .replace(", link_axes: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "")
             .replace(&no_clusters(), "")

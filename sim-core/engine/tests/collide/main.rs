@@ -1,5 +1,6 @@
 //! Contacts of two shapes: closed forms, exact oracles, parry3d, and the same bits whatever the width of a block.
 
+mod capsule_boxes;
 mod hulls;
 mod lanes;
 mod oracle;

@@ -3,7 +3,7 @@
 use sim_engine::backend::{Lanes, Precision, Values};
 use sim_engine::simulation::{Options, Simulation};
 use sim_model::geometry::{Hull, Mesh, TriMesh};
-use sim_model::{Body, Collision, Description, Pose};
+use sim_model::{Body, Collision, Description, GeomContact, Pose, Softness};
 use sim_physics::arrays::{Dtype, Field};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -190,6 +190,32 @@ pub fn contacts(
     pairs: &[Pair],
     margin: f64,
 ) -> Vec<Vec<Contact>> {
+    contacts_of(machine, hulls, pairs, margin, None)
+}
+
+/// The same where the second shape is a geom of MuJoCo's.
+pub fn contacts_of_geoms(machine: Machine, pairs: &[Pair], margin: f64) -> Vec<Vec<Contact>> {
+    let geom = GeomContact {
+        contype: 1,
+        conaffinity: 1,
+        condim: 3,
+        priority: 0,
+        solmix: 1.0,
+        softness: Softness::default(),
+        friction: [1.0, 0.005, 0.0001],
+        margin: 0.0,
+        gap: 0.0,
+    };
+    contacts_of(machine, &[], pairs, margin, Some(geom))
+}
+
+fn contacts_of(
+    machine: Machine,
+    hulls: &[Hull],
+    pairs: &[Pair],
+    margin: f64,
+    geom: Option<GeomContact>,
+) -> Vec<Vec<Contact>> {
     pairs
         .chunk_by(|a, b| a.shapes == b.shapes && a.axes[0] == b.axes[0])
         .flat_map(|group| {
@@ -197,7 +223,8 @@ pub fn contacts(
             let still = posed(&group[0].axes[0], [0.0; 3]);
             let places = group.iter().map(|pair| posed(&pair.axes[1], pair.center));
             let places: Vec<Pose> = places.collect();
-            touching(machine, hulls, (first, still), (second, &places), margin)
+            let free = (second, &places[..], geom);
+            touching(machine, hulls, (first, still), free, margin)
         })
         .collect()
 }
@@ -207,7 +234,14 @@ pub fn contacts_exchanged(hulls: &[Hull], pair: &Pair, margin: f64) -> Vec<Conta
     let [first, second] = pair.shapes;
     let still = posed(&pair.axes[1], pair.center);
     let place = posed(&pair.axes[0], [0.0; 3]);
-    touching(DOUBLE, hulls, (second, still), (first, &[place]), margin).remove(0)
+    touching(
+        DOUBLE,
+        hulls,
+        (second, still),
+        (first, &[place], None),
+        margin,
+    )
+    .remove(0)
 }
 
 /// Contacts of a shape that stands still and a free one in many places.
@@ -215,14 +249,15 @@ fn touching(
     machine: Machine,
     hulls: &[Hull],
     (still, pose): (Shape, Pose),
-    (free, places): (Shape, &[Pose]),
+    (free, places, geom): (Shape, &[Pose], Option<GeomContact>),
     margin: f64,
 ) -> Vec<Vec<Contact>> {
     let mut scene = Description::new(1e-3, 1);
     let shape = scene.add_shape("still", still.described(hulls), pose);
     shape.surface.margin = margin;
     let mut body = Body::new("free", Pose::identity());
-    let shape = Collision::new(None, free.described(hulls), Pose::identity());
+    let mut shape = Collision::new(None, free.described(hulls), Pose::identity());
+    shape.geom = geom;
     body.shapes.push((shape, 1000.0));
     scene.add_body(body).unwrap();
     let options = Options {

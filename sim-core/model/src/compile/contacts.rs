@@ -8,7 +8,7 @@ use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
 use sim_physics::constants::contact::{
-    Class, Column, Contacts, FrictionCombine, Pair, Run, pair, row,
+    Class, Column, Contacts, FrictionCombine, Kind, Pair, Run, pair, row,
 };
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::constants::{Constants, Coupled, Impedance};
@@ -138,6 +138,7 @@ impl ContactBuilder<'_> {
             contacts.tables.numbers.extend(ratios.as_flattened());
         }
         self.add_combine(contacts, pairs);
+        contacts.mujoco_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
         let coupled = self.coupled(contacts);
         for class in &mut contacts.classes {
             let pattern = match class.couples {
@@ -232,6 +233,13 @@ impl ContactBuilder<'_> {
             rows: pairs.len(),
         };
         contacts.tables.numbers.extend(keeps);
+    }
+
+    /// Whether a pair is of a capsule and a box, one of which is a geom of MuJoCo's.
+    fn is_capsule_box_geom(&self, (a, b): (usize, usize)) -> bool {
+        let [a, b] = [a, b].map(|piece| &self.pieces[piece]);
+        let [x, y] = [a, b].map(|piece| &self.shapes[piece.shape]);
+        (a.solid.kind, b.solid.kind) == (Kind::Capsule, Kind::Box) && self.geom_pair(x, y).is_some()
     }
 
     fn bound(&self, (a, b): (usize, usize)) -> usize {

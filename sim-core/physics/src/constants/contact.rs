@@ -103,6 +103,8 @@ recast! {
         pub combine: FrictionCombine,
         /// Of each pair, 1 where the larger friction counts all the same; without rows where that is so of none or of all.
         pub keeps_max: Fixed,
+        /// Whether capsules and boxes have MuJoCo's points: where one of these pairs is of a geom of MuJoCo's.
+        pub mujoco_capsule_boxes: bool,
     }
 }
 
@@ -471,6 +473,7 @@ impl<R: Real> Contacts<R> {
             turning: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
+            mujoco_capsule_boxes: false,
         }
     }
 

@@ -3,6 +3,7 @@
 //! The capsule's centre is the origin, its axis is z of its frame. A contact point of a capsule is that of the sphere around
 //! a point of its axis, so both functions look for points of the axis.
 
+use super::capsule_box::mujoco_capsule_box;
 use super::narrow::ShapePair;
 use super::points::Points;
 use super::select::{
@@ -96,7 +97,7 @@ fn add_balls<C: Cx>(
     add_sphere_sphere(cx, pair, &a, &b, out);
 }
 
-/// Capsule and box: the sphere around the point of the axis that is nearest to the box, and those around the ends of the
+/// Capsule and box, unless MuJoCo's points are wanted ([`super::capsule_box`]): the sphere around the point of the axis that is nearest to the box, and those around the ends of the
 /// part of the axis over the face or edge which that sphere touches.
 #[inline(always)]
 pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
@@ -108,6 +109,9 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
         along: b.axes.transpose_mul(pair.axes_a[2]),
         half_height,
     };
+    if pair.as_mujoco {
+        return mujoco_capsule_box(cx, pair, &axis, out);
+    }
     let size = half[0] + half[1] + half[2] + half_height + radius;
     let nearest = axis.nearest_to_box(half);
     let exit = BoxExit::find(axis.at(nearest), half);
@@ -140,7 +144,7 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
 
 /// Adds the contact of the sphere around a point of the axis.
 #[inline(always)]
-fn add_ball_at<C: Cx>(
+pub(super) fn add_ball_at<C: Cx>(
     cx: &mut C,
     pair: &ShapePair<'_, C>,
     axis: &CapsuleAxis<C::F>,
@@ -154,10 +158,13 @@ fn add_ball_at<C: Cx>(
 }
 
 /// The axis of a capsule in the frame of a box.
-struct CapsuleAxis<F> {
-    middle: Vec3<F>,
-    along: Vec3<F>,
-    half_height: F,
+pub(super) struct CapsuleAxis<F> {
+    /// Its middle [m].
+    pub middle: Vec3<F>,
+    /// Its direction [–].
+    pub along: Vec3<F>,
+    /// Half its length [m].
+    pub half_height: F,
 }
 
 impl<F: Num> CapsuleAxis<F> {

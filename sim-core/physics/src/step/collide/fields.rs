@@ -165,6 +165,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             margin,
             hull_tables: &t.hulls,
             clip_tables: t.memory.cut,
+            as_mujoco: false,
         };
         let mut out = points_of::<C>(cx, t, p, center, origin);
         let mut found = candidates(cx, t.memory.field_candidates, &out);

@@ -11,12 +11,14 @@
 //! | Pairs | Method | File |
 //! |---|---|---|
 //! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
+//! | capsule and box, of models from MuJoCo | MuJoCo's choice of features | `capsule_box` |
 //! | box and box | separating axes, clipping | `boxes`, `box_faces` |
 //! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |
 //! | height field | a convex prism below each of its triangles | `fields`, `field_samples`, `prisms`, `prism_hull` |
 
 mod box_faces;
 mod boxes;
+mod capsule_box;
 mod capsules;
 mod clip;
 mod convex;
@@ -256,6 +258,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
                 margin: cx.constant(scalars, p, pair::REACH) + contact_slack(smaller),
                 hull_tables: &t.hulls,
                 clip_tables: t.memory.cut,
+                as_mujoco: t.mujoco_capsule_boxes,
             };
             let near = boxes_near::<C, N>(cx, t, p, &shapes, near);
             when!(cx, near, {

@@ -4,7 +4,7 @@
 
 use super::narrow::ShapePair;
 use super::points::Points;
-use super::select::{clamp_to_box, column_at, min_component, select, sign};
+use super::select::{clamp_to_box, column_at, min_component, select};
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::vec3::{Mat3, Vec3};
 
@@ -139,10 +139,12 @@ impl<F: Num> BoxExit<F> {
             half[2] - point[2].abs(),
         ]);
         let (face, depth) = min_component(depths);
+        // between two faces MuJoCo takes that at the negative end
+        let side = |x: F| F::select(zero.lt(x), one, -one);
         let faces = Mat3([
-            Vec3([sign(point[0]), zero, zero]),
-            Vec3([zero, sign(point[1]), zero]),
-            Vec3([zero, zero, sign(point[2])]),
+            Vec3([side(point[0]), zero, zero]),
+            Vec3([zero, side(point[1]), zero]),
+            Vec3([zero, zero, side(point[2])]),
         ]);
         BoxExit {
             distance: F::select(outside, length, -depth),

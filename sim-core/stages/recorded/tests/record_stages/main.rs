@@ -195,6 +195,7 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
     let (free, tight) = (
         cases::shapes(Cone::Elliptic, None),
         cases::shapes(Cone::Pyramidal, Some(5)),
+        cases::shapes_as_mujoco(),
     );
     for case in [&free, &tight] {
         let m = &case.m;
@@ -306,6 +307,7 @@ fn what_a_stage_does_not_name_it_neither_reads_nor_writes() {
         fr3(),
         every_joint(),
         cases::shapes(Cone::Elliptic, None),
+        cases::shapes_as_mujoco(),
         arm_and_cube(),
         cases::mujoco("implicit"),
         cases::mujoco("runge_kutta"),
