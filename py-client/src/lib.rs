@@ -73,7 +73,8 @@ mod core {
     use super::rays::RayScene;
     #[pymodule_export]
     use super::scene::{
-        load_scene, parse_scene, read_mesh, read_mujoco, read_urdf, save_scene, scene_to_toml,
+        compiled_scene, load_scene, parse_scene, read_mesh, read_mujoco, read_urdf, save_scene,
+        scene_to_toml,
     };
     #[pymodule_export]
     use super::{command_line, field_names, param_names};

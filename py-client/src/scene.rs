@@ -92,6 +92,14 @@ pub(crate) fn parse_scene(py: Python<'_>, text: &str) -> PyResult<String> {
     Ok(scene.to_json().to_string())
 }
 
+/// A scene as it is simulated, as JSON (`SceneFile::compiled` says what it has); the scene is TOML with absolute paths.
+#[pyfunction]
+pub(crate) fn compiled_scene(py: Python<'_>, scene: &str) -> PyResult<String> {
+    py.detach(|| config::parse(scene, "scene")?.compiled(Path::new("/")))
+        .map(|compiled| compiled.to_string())
+        .map_err(|error| scene_error(py, &error))
+}
+
 fn from_json(py: Python<'_>, scene: &str) -> PyResult<SceneFile> {
     SceneFile::from_json(scene).map_err(|error| scene_error(py, &error))
 }

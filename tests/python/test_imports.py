@@ -55,6 +55,7 @@ LAYERS = (
         "tightloop.entity",
         "tightloop.height_fields",
         "tightloop.joint_order",
+        "tightloop.mjcf",
         "tightloop.mujoco_model",
         "tightloop.robot",
         "tightloop.robot_properties",

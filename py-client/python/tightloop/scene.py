@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, advice, checks, height_fields, notebook
+from tightloop import _core, advice, checks, height_fields, mjcf, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError, UrdfError
@@ -26,6 +26,7 @@ from tightloop.scene_options import FrictionCombine
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
 from tightloop.signatures import checked_calls
+from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -402,6 +403,36 @@ class Scene(SceneRandomization):
     def to_toml(self) -> str:
         """Return the text of a scene file with absolute paths, as a daemon gets it."""
         return _core.scene_to_toml(self._json())
+
+    def to_mujoco(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Return the scene as MJCF, which MuJoCo compiles to the same mass matrix, bias forces, drives and contacts.
+
+        The text comes from the model that `launch` would run: inertias are balanced, fixed links merged where MuJoCo
+        merges them, and convex hulls are written out, so the text needs no mesh files. Names stay, such as
+        ``arm/joint1``. Keyframe ``start`` is the start of the scene with the targets of its drives. ``substeps`` steps
+        of MuJoCo are one control frame.
+
+        Args:
+            path: File to write, too. An existing file is replaced.
+
+        Returns:
+            The XML text, for ``mujoco.MjModel.from_xml_string``.
+
+        Raises:
+            SceneError: The scene does not compile, or part of it has no equal in MJCF: a MuJoCo model, a drive of a
+                ball joint, damping of a free joint. The message names it. Or the file cannot be written.
+        """
+        text = mjcf.written(json.loads(_core.compiled_scene(self.to_toml())), "scene")
+        left = [*self.contact_sensors, *self.height_scans]
+        if left:
+            advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
+        if self._offsets or self.params:
+            fields = ", ".join(sorted({*self._offsets, *self.params}))
+            advice.warn(f"to_mujoco: {fields} vary between worlds; the text has the values of the scene")
+        if path is not None:
+            with whole_file(checks.path("to_mujoco: path", path), SceneError) as file:
+                file.write_text(text, encoding="utf-8")
+        return text
 
     def _repr_html_(self) -> str:
         rows = [("robot", name, f"{robot.dofs} dofs") for name, robot in self.robots.items()]

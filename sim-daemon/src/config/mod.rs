@@ -3,6 +3,7 @@
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
 mod bodies;
+mod compiled;
 mod error;
 mod ik;
 mod mujoco;
