@@ -27,17 +27,16 @@ WEIGHTS = CONTROL_DT * np.array([1.5, 0.75, -1.0, -0.05, -2.5, -2e-4, -0.01, 1.0
 class Side:
     """The environment."""
 
-    def start(self, xml: str, solref: str, actions: str, worlds: int) -> dict[str, Any]:
+    def start(self, xml: str, robot: str, actions: str, worlds: int) -> dict[str, Any]:
         """Make worlds of a model, and reset them."""
         model = mujoco.MjModel.from_xml_path(xml)
-        model.jnt_solref[:] = np.load(solref)
         self.actions, self.count = np.load(actions), 0
         self.limits = model.jnt_range[1:].T
         # heights of feet are those one physics step before, as mj_step leaves them
         self.batch = Batch(model, worlds, num_threads=1)
         names = ("qpos", "qvel", "ctrl", "xpos", "qfrc_actuator")
         self.qpos, self.qvel, self.ctrl, self.places, self.torque = (self.batch.bind(name) for name in names)
-        self.feet = [model.body(f"{leg}_foot").id for leg in ("FL", "FR", "RL", "RR")]
+        self.feet = [model.body(f"{robot}/{leg}_foot").id for leg in ("FL", "FR", "RL", "RR")]
         self.rng = np.random.default_rng(0)
         self.last, self.phase, self.age = np.zeros((worlds, 12)), np.zeros(worlds), np.zeros(worlds, int)
         self.command = np.zeros((worlds, 3))

@@ -19,13 +19,11 @@ from pathlib import Path
 
 import numpy as np
 from mujoco_models import Mjbatch
-from record import REPOSITORY, print_table, write_results
+from record import print_table, write_results
 
 import tightloop as tl
-from tightloop.env import VectorEnv, policy_metadata
-
-sys.path.append(str(REPOSITORY / "examples"))
-from sim2sim import Facts, mujoco_model, mujoco_spec
+from tightloop.env import VectorEnv
+from tightloop.tasks.quadruped import QuadrupedVelocityFlat
 
 TASK, ASKED = "QuadrupedVelocityFlat", 15.0
 WORLDS = (2048, 256)  # of tightloop and of mjbatch, each where it is fastest
@@ -66,14 +64,13 @@ def main() -> int:
     rng = np.random.default_rng(0)
     actions = [SPREAD * rng.standard_normal((ACTIONS, worlds, 12)).astype(np.float32) for worlds in WORLDS]
     ours, peer = Ours(actions[0]), Mjbatch("quadruped_peer.py")
-    facts = Facts(Path(TASK), policy_metadata(ours.env))
+    scene = QuadrupedVelocityFlat().scene()
+    (robot,) = scene.robots
     with tempfile.TemporaryDirectory() as folder:
-        files = {name: str(Path(folder) / name) for name in ("xml", "solref", "actions")}
-        Path(files["xml"]).write_text(mujoco_spec(tl.assets.QUADRUPED, facts).to_xml())
-        np.save(files["solref"], mujoco_model(tl.assets.QUADRUPED, facts).jnt_solref)
-        np.save(files["actions"], actions[1])
-        suffixed = {name: file if name == "xml" else f"{file}.npy" for name, file in files.items()}
-        peer.ask("start", worlds=WORLDS[1], **suffixed)
+        xml, given_actions = str(Path(folder) / "quadruped.xml"), str(Path(folder) / "actions.npy")
+        scene.to_mujoco(xml)
+        np.save(given_actions, actions[1])
+        peer.ask("start", xml=xml, robot=robot, actions=given_actions, worlds=WORLDS[1])
     rates: dict[str, list[list[float]]] = {"tightloop": [], "mjbatch": []}
     for count in range(given.rounds + 1):
         seconds = MEASURED_S if count else SETTLED_S

@@ -3,8 +3,8 @@
     pip install mujoco onnxruntime
     python examples/sim2sim.py out/ppo/QuadrupedVelocityFlat-0/policy.onnx
 
-The ONNX file's metadata says what the policy sees, what its actions mean, and which gains and rates the robot has. The
-side of MuJoCo C uses nothing else but the robot's URDF file. The side of tightloop is the task itself.
+The ONNX file's metadata says what the policy sees and what its actions mean. MuJoCo's model is written from the task's
+scene by `Scene.to_mujoco`, so any robot that the task takes runs there. The side of tightloop is the task itself.
 
 First both simulators play the same actions from the same state, open loop. The distances of their joints and
 observations are printed. Then the policy drives each robot for 10 s per command, closed loop, and the error of its
@@ -35,8 +35,6 @@ with needed("mujoco", "onnxruntime"):
 ORDER = ("ahead_mps", "left_mps", "turn_radps")
 COMMANDS = np.array([[0.5, 0, 0], [1, 0, 0], [-0.5, 0, 0], [0, 0.5, 0], [0, 0, 1], [0.7, 0, -0.7]])  # in this order
 STEPS, OPEN_LOOP = 500, 50  # control steps of each
-# Joint limits of tightloop: stiffness and damping in force space, and the largest impedance of MuJoCo's default solimp
-LIMIT_KE, LIMIT_KD, IMPEDANCE_MAX = 1e4, 10.0, 0.95
 
 
 class Facts:
@@ -67,41 +65,6 @@ class Facts:
     def options(self) -> dict[str, Any]:
         """Return the arguments that the task was made with."""
         return json.loads(self._metadata.get("task_options", "{}"))
-
-
-def mujoco_spec(robot: Path, facts: Facts) -> mujoco.MjSpec:
-    """The robot on flat ground, with the drives and the time step of the metadata."""
-    text = robot.read_text()
-    head = text.index(">", text.index("<robot")) + 1
-    compiler = '<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco>'
-    spec = mujoco.MjSpec.from_string(text[:head] + compiler + text[head:])
-    for geom in spec.geoms:
-        geom.contype, geom.conaffinity = 0, 1  # not against each other
-    drives = (facts.numbers(f"joint_{name}") for name in ("stiffness", "damping", "effort_limit", "armature"))
-    for name, stiffness, damping, effort, armature in zip(facts.names("joint_names"), *drives, strict=True):
-        joint = spec.joint(name)
-        joint.armature, joint.actfrclimited = armature, False
-        actuator = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
-        actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-        actuator.gainprm[0], actuator.biasprm[:3] = stiffness, (0, -stiffness, -damping)
-        if np.isfinite(effort):
-            actuator.forcelimited, actuator.forcerange = True, (-effort, effort)
-    spec.worldbody.first_body().add_freejoint()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
-    option = spec.option
-    option.timestep, option.integrator = facts.number("dt"), mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.iterations, option.tolerance = 20, 1e-8
-    return spec
-
-
-def mujoco_model(robot: Path, facts: Facts) -> mujoco.MjModel:
-    """The same, with the joint limits of tightloop."""
-    model = mujoco_spec(robot, facts).compile()
-    flexibility = model.dof_invweight0[model.jnt_dofadr] * (1 - IMPEDANCE_MAX)
-    limited = model.jnt_limited.astype(bool)
-    model.jnt_solref[limited, 0] = (2 / (LIMIT_KD * flexibility))[limited]
-    model.jnt_solref[limited, 1] = (LIMIT_KD * flexibility / 2 * np.sqrt(1 / (LIMIT_KE * flexibility)))[limited]
-    return model
 
 
 class Player:
@@ -154,39 +117,43 @@ class Player:
 
 
 class InMujoco(Player):
-    """In MuJoCo C, from metadata alone."""
+    """In MuJoCo C, from the scene as MJCF, seen as the metadata says."""
 
-    def __init__(self, facts: Facts, robot: Path) -> None:
+    def __init__(self, facts: Facts, scene: tl.Scene) -> None:
         super().__init__(facts)
-        self.model = mujoco_model(robot, facts)
+        self.model = mujoco.MjModel.from_xml_string(scene.to_mujoco())
         self.data = mujoco.MjData(self.model)
-        self._coords, self._dofs = (
-            [int(getattr(self.model.joint(name), place)[0]) for name in self.names] for place in ("qposadr", "dofadr")
-        )
+        (robot,) = scene.robots
+        own = [self.model.joint(f"{robot}/{name}").id for name in self.names]
+        self._coords, self._dofs = self.model.jnt_qposadr[own], self.model.jnt_dofadr[own]
+        # a joint without gains has no actuator
+        self._actuators = [list(own).index(joint) for joint in self.model.actuator_trnid[:, 0]]
+        free = int(np.flatnonzero(self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])
+        self._free, self._trunk = int(self.model.jnt_qposadr[free]), int(self.model.jnt_bodyid[free])
         self._parts, self._rest = facts.names("observation_names"), facts.numbers("default_joint_pos")
         self._bounds = facts.numbers("observation_low"), facts.numbers("observation_high")
         if set(facts.numbers("observation_history")) != {1}:
             raise SystemExit("the policy sees steps before; this shows it the current one only")
         self._turn = 2 * np.pi * facts.number("gait_hz") * facts.number("control_dt") if "phase" in self._parts else 0.0
-        own = [self.model.joint(name).id for name in self.names]
         self._range = np.where(self.model.jnt_limited[own], self.model.jnt_range[own].T, [[-np.inf], [np.inf]])
         self._substeps, self._phase = int(facts.number("substeps")), 0.0
 
     def _start(self, joint_q: NDArray[np.float64]) -> None:
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:7], self.data.qpos[self._coords] = joint_q[[0, 1, 2, 6, 3, 4, 5]], joint_q[7:]
+        self.data.qpos[self._free : self._free + 7] = joint_q[[0, 1, 2, 6, 3, 4, 5]]
+        self.data.qpos[self._coords] = joint_q[7:]
         self._phase = 0.0
         self._observe()
 
     def _step(self, targets: NDArray[np.float64]) -> None:
-        self.data.ctrl[:] = np.clip(targets, *self._range)
+        self.data.ctrl[:] = np.clip(targets, *self._range)[self._actuators]
         mujoco.mj_step(self.model, self.data, self._substeps)
         # a robot that is to stand marks no time
         self._phase = (self._phase + self._turn) * self.command.any()
         self._observe()
 
     def _observe(self) -> None:
-        data, trunk, twist = self.data, 1, np.zeros(6)
+        data, trunk, twist = self.data, self._trunk, np.zeros(6)
         mujoco.mj_forward(self.model, data)
         # angular, then that of the trunk's centre of mass, in world axes
         mujoco.mj_objectVelocity(self.model, data, mujoco.mjtObj.mjOBJ_BODY, trunk, twist, 0)
@@ -237,10 +204,10 @@ class InTightloop(Player):
 
 
 def main() -> None:
-    """Compare the two."""
+    """Read the policy and compare."""
     parser = argparse.ArgumentParser(description="Run a walking policy in MuJoCo C.")
     parser.add_argument("policy", type=Path, help="ONNX file with metadata, of a task that follows velocities")
-    parser.add_argument("--robot", type=Path, help="URDF file (default: that of this name in tightloop.assets)")
+    parser.add_argument("--robot", type=Path, help="URDF file (default: that of the policy's task)")
     args = parser.parse_args()
     if not args.policy.is_file():
         raise SystemExit(f"there is no policy {args.policy}; name an ONNX file, such as those in examples/trained")
@@ -251,20 +218,28 @@ def main() -> None:
     facts = Facts(args.policy, session.get_modelmeta().custom_metadata_map)
     options = facts.options()
     # the policy's own robot, or a copy of its file elsewhere
-    if "model" in options:
-        options["model"] = args.robot = str(args.robot or options["model"])
-    robot = Path(args.robot) if args.robot else tl.assets.QUADRUPED.with_name(facts.names("robot_files")[0])
-    if not robot.is_file():
-        raise SystemExit(f"there is no robot {robot}; name its URDF file by --robot")
+    if args.robot:
+        options["model"] = str(args.robot)
+    if "model" in options and not Path(options["model"]).is_file():
+        raise SystemExit(f"there is no robot {options['model']}; name its URDF file by --robot")
+    try:
+        compare(session, facts, options)
+    except tl.TightloopError as error:
+        raise SystemExit(f"{args.policy}: {error}") from None
+
+
+def compare(session: onnxruntime.InferenceSession, facts: Facts, options: dict[str, Any]) -> None:
+    """Play the same actions in both simulators, then follow each command in both, and print the errors."""
     commands = COMMANDS[:, [ORDER.index(name) for name in facts.names("command_names")]]
 
     def policy(obs: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray(session.run(None, {session.get_inputs()[0].name: obs})[0])
 
     task = make_task(facts.names("task")[0], options)
-    with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
+    scene = task.scene()
+    with tl.launch(scene, worlds=1, precision="f64", fields=task.fields) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
-        ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, robot)
+        ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, scene)
         ours.begin(start, commands[1]), theirs.begin(start, commands[1])
         for step in range(1, OPEN_LOOP + 1):
             action = policy(ours.obs)

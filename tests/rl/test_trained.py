@@ -87,7 +87,7 @@ def test_mujoco_shows_the_joints_of_the_action_alone(tmp_path: Path) -> None:
     assert len(facts.names("joint_names")) == 14
     with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
-        players = InTightloop(facts, task, sim), InMujoco(facts, file)
+        players = InTightloop(facts, task, sim), InMujoco(facts, task.scene())
         for player in players:
             player.begin(start, COMMANDS[0])
             for _ in range(5):

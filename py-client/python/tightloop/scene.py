@@ -426,9 +426,9 @@ class Scene(SceneRandomization):
         left = [*self.contact_sensors, *self.height_scans]
         if left:
             advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
-        if self._offsets or self.params:
-            fields = ", ".join(sorted({*self._offsets, *self.params}))
-            advice.warn(f"to_mujoco: {fields} vary between worlds; the text has the values of the scene")
+        drawn = sorted({*self.params, *self._offsets} & set(_core.param_names()))
+        if drawn:
+            advice.warn(f"to_mujoco: worlds differ in {', '.join(drawn)}; the text has the values of the scene")
         if path is not None:
             with whole_file(checks.path("to_mujoco: path", path), SceneError) as file:
                 file.write_text(text, encoding="utf-8")
