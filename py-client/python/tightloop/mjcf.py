@@ -82,7 +82,8 @@ class _Writer:
         self._equalities()
         controls = self._drives()
         keys = SubElement(SubElement(self.root, "keyframe"), "key", name="start")
-        keys.set("qpos", _words(q for joint in self.world.iter() for q in self.starts.get(joint.get("name", ""), ())))
+        joints = (part.attrib["name"] for part in self.world.iter() if part.tag in ("joint", "freejoint"))
+        keys.set("qpos", _words(q for name in joints for q in self.starts[name]))
         keys.set("ctrl", _words(controls))
         for empty in [part for part in self.root if part is not self.world and not (len(part) or part.attrib)]:
             self.root.remove(empty)

@@ -193,6 +193,14 @@ def test_followers_and_limits_act_alike(tmp_path: Path) -> None:
     assert_same_motion(scene)
 
 
+def test_links_and_joints_may_share_their_names(tmp_path: Path) -> None:
+    file = robot_of(tmp_path, '<link name="base"/>', link("a"), link("b"), joint("a", "continuous", "base", "a"))
+    file.write_text(file.read_text().replace("</robot>", joint("b", "spherical", "a", "b") + "</robot>"))
+    scene = tl.Scene()
+    scene.add_urdf(file, name="r").joint_q = [0.5, 0.6, 0.0, 0.0, 0.8]
+    assert_same_motion(scene)
+
+
 def test_a_height_field_has_the_same_surface_and_bottom(tmp_path: Path) -> None:
     samples = np.random.default_rng(0).uniform(-0.2, 0.3, (4, 7))
     scene = tl.Scene()
@@ -238,11 +246,9 @@ def test_what_mjcf_cannot_say_is_refused_or_reported_by_name(tmp_path: Path) -> 
     robot.joint_armature = 1.0
     scene.add_ground()
     scene.to_mujoco()
-    scene.add_mujoco(
-        mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'), name="m"
-    )
+    ball = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
     with pytest.raises(SceneError, match="MuJoCo model `m` came from MuJoCo; use the MJCF file"):
-        scene.to_mujoco()
+        tl.Scene.from_mujoco(ball, name="m").to_mujoco()
     with pytest.raises(SceneError, match="no_folder"):
         tl.Scene().to_mujoco(tmp_path / "no_folder/scene.xml")
 
