@@ -64,6 +64,7 @@ class VelocityTask(Task):
     command_max: tuple[float, float, float] = (1.0, 0.6, 1.0)
     lowest: float = 0.15
     _options: str = ""
+    _sharpness: float = 200.0  # of the reward for the gait [1/m²]
 
     def __init__(self, pushes: float | None, push: float, model: Model | None, options: RobotOptions) -> None:
         """Choose the robot.
@@ -89,12 +90,11 @@ class VelocityTask(Task):
 
             file = own.file if model is None else model
             self.robot = read(task, file, own=own, count=self.legs, options=options, dt=DT)
-        # a class of a file may choose its robot itself, and takes no such options
-        if self.robot is not own and "model" in inspect.signature(type(self)).parameters:
-            self._options = _told(model, options)
-            size = self.robot.hip_height / own.hip_height
-            self.lowest = self.robot.height - own.height * size + self.lowest * size
-            self.swing *= size
+        if self.robot is not own:
+            # a class of a file may choose its robot itself, and takes no such options
+            if "model" in inspect.signature(type(self)).parameters:
+                self._options = _told(model, options)
+            self._resize(own)
         if pushes is None:
             self.pushes = push * (self.robot.mass / own.mass)
         else:
@@ -103,6 +103,23 @@ class VelocityTask(Task):
         further = [field for field in self.fields if field not in VelocityTask.fields]
         self.fields = ("joint_q", "joint_qd", self.robot.torque_field, self.robot.site_field, *further)
         self.initial_draws += self.robot.start_draws
+
+    def _resize(self, own: LeggedRobot) -> None:
+        """Scale what depends on the robot's size from the task's own robot to this one.
+
+        Legs swing like pendulums, at a rate in proportion to 1/√length (Alexander and Jayes 1983, 10.1111/j.1469-7998.
+        1983.tb04266.x). Torques that hold a robot are in proportion to mass · length, so that their squares have the
+        same share of the reward.
+        """
+        size = self.robot.hip_height / own.hip_height
+        self.lowest = self.robot.height - own.height * size + self.lowest * size
+        self.swing *= size
+        self.gait /= float(np.sqrt(size))
+        self._sharpness /= size * size
+        load = size * self.robot.mass / own.mass
+        self.reward_weights = {
+            name: weight / (load * load) if name == "torque" else weight for name, weight in self.reward_weights.items()
+        }
 
     def scene(self) -> tl.Scene:
         """The robot on the ground. Each world starts in another direction, with its joints a little off."""
@@ -228,7 +245,7 @@ class VelocityTask(Task):
             "tilt": squares(xp, gravity[:, :2]),
             "torque": squares(xp, columns(xp, getattr(worlds, self._torques), self._dofs)),
             "action rate": squares(xp, worlds.action - worlds.previous_action),
-            "gait": xp.exp(-200.0 * own["feet"]),
+            "gait": xp.exp(-self._sharpness * own["feet"]),
             "pose": squares(xp, columns(xp, worlds.joint_q, self._joints) - xp.asarray(self._standing)),
             "fall": 1.0 * self.terminated(xp, worlds),
         }

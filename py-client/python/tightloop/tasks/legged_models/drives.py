@@ -99,10 +99,8 @@ def _share(skeleton: Skeleton, legs: Sequence[Leg], joint: int, q: Array) -> flo
     return HIP if share < 0.3 else KNEE if share < 0.85 else ANKLE
 
 
-def targets(
-    skeleton: Skeleton, soles: Sequence[Sole], action: Sequence[int], q: Array, stiffness: Sequence[float]
-) -> Array:
-    """Return targets with which drives hold the robot at its pose against gravity [rad], shape ``(actions,)``.
+def standing_torques(skeleton: Skeleton, soles: Sequence[Sole], q: Array) -> Array:
+    """Return the torques of all joints that hold the robot at a pose against gravity [N·m], shape ``(joints,)``.
 
     Feet bear the weight as evenly as its centre allows. Torques are those of gravity less those of the feet's forces.
     """
@@ -114,6 +112,14 @@ def targets(
     torques = skeleton.gravity(q)
     for foot, place, force in zip(soles, places, np.maximum(forces, 0.0), strict=True):
         torques = torques - force * (place_of(skeleton, foot, moved)[:, 2] - place[2]) / step
+    return torques
+
+
+def targets(
+    skeleton: Skeleton, soles: Sequence[Sole], action: Sequence[int], q: Array, stiffness: Sequence[float]
+) -> Array:
+    """Return targets with which drives hold the robot at its pose against gravity [rad], shape ``(actions,)``."""
+    torques = standing_torques(skeleton, soles, q)
     effort = np.array([skeleton.joints[joint].effort for joint in action])
     own = np.clip(torques[list(action)], -effort, effort) / np.maximum(stiffness, 1e-9)
     return np.clip(q[list(action)] + own, skeleton.low[list(action)], skeleton.high[list(action)])

@@ -13,6 +13,7 @@ from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
 from tightloop.tasks.legged_models import legs as chains
 from tightloop.tasks.legged_models import urdf
 from tightloop.tasks.legged_models.drives import targets
+from tightloop.tasks.legged_models.load import warn_of_load
 from tightloop.tasks.legged_models.options import values, with_mirror
 from tightloop.tasks.legged_models.pose import sole
 from tightloop.tasks.legged_models.read import legs_of
@@ -80,6 +81,7 @@ def _stood(what: str, own: LeggedRobot, count: int, standing: Mapping[str, float
     sunk = float(ground[0] - ground[1])
     pose = dict(zip(names, q.tolist(), strict=True))
     action = [names.index(joint) for joint in own.joints]
+    warn_of_load(what, skeleton, legs, q)
     soles = [sole(skeleton, leg, q) for leg in legs]
     return replace(
         own,

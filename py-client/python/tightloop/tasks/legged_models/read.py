@@ -21,6 +21,7 @@ from tightloop.tasks.legged_models import legs as chains
 from tightloop.tasks.legged_models import mjcf, urdf
 from tightloop.tasks.legged_models.drives import Drive
 from tightloop.tasks.legged_models.legs import Leg
+from tightloop.tasks.legged_models.load import warn_of_load
 from tightloop.tasks.legged_models.options import values, with_mirror
 from tightloop.tasks.legged_models.pose import Sole, sole
 from tightloop.tasks.legged_models.skeleton import Array, Skeleton
@@ -69,6 +70,7 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
     flip = chains.mirror(skeleton, action)
     q = standing_pose(skeleton, legs, action, flip)
     q = with_given(f"{what}: standing", skeleton, legs, q, options.standing)
+    warn_of_load(what, skeleton, legs, q)
     soles = [sole(skeleton, leg, q) for leg in legs]
     frames = skeleton.frames(q[None])
     lowest = min(float(skeleton.lowest(skeleton.moves[leg.joints[-1]], frames)[0]) for leg in legs)

@@ -10,6 +10,7 @@ import numpy as np
 from tightloop.env.mirror import Flip
 from tightloop.errors import ArgumentError
 from tightloop.tasks.legged_models.legs import Leg
+from tightloop.tasks.legged_models.load import loads
 from tightloop.tasks.legged_models.options import by_name
 from tightloop.tasks.legged_models.pose import Aim, Sole, knee_of, mirrored, place_of, sole, solve, stands
 from tightloop.tasks.legged_models.skeleton import Array, Skeleton
@@ -28,8 +29,10 @@ _ANY_HEIGHT = 0.3
 _MARGIN = 0.15
 #: Positions that a user gives may be rounded so much beyond a limit [rad].
 _ROUNDED = 1e-3
-#: Knees behind the line from hip to foot, else ahead of it.
-_SIDES = (-1.0, 1.0)
+#: Sides of the knees of front and hind legs, as people build them: -1 behind the line from hip to foot, 1 ahead of it.
+_SIDES = ((-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0))
+#: Knees bend another way if that takes at most this share of the largest load [–].
+_EASIER = 0.85
 #: A leg whose first joint is more upright than this moves its foot around its hip.
 _UPRIGHT = 0.7
 
@@ -54,9 +57,16 @@ def standing_pose(skeleton: Skeleton, legs: Sequence[Leg], action: Sequence[int]
             return kept
     left = None if flip is None else [leg for leg in legs if leg.hip[1] >= 0]
     solved = legs if left is None or 2 * len(left) != len(legs) else left
-    find = _humanoid if len(legs) == 2 else _quadruped
-    q = find(skeleton, legs, solved, q)
-    return mirrored(skeleton, action, flip, legs, q) if solved is left and flip is not None else q
+
+    def whole(found: Array) -> Array:
+        return mirrored(skeleton, action, flip, legs, found) if solved is left and flip is not None else found
+
+    if len(legs) == 2:
+        return whole(_humanoid(skeleton, legs, solved, q))
+    poses = [whole(found) for found in _quadruped(skeleton, legs, solved, q)]
+    worst = [float(loads(skeleton, legs, pose).max()) for pose in poses]
+    easiest = int(np.argmin(worst))
+    return poses[easiest] if worst[easiest] < _EASIER * worst[0] else poses[0]
 
 
 def with_given(
@@ -149,12 +159,12 @@ def _places(skeleton: Skeleton, soles: Sequence[Sole], q: Array) -> Array:
     return np.array([place_of(skeleton, foot, frames)[0] for foot in soles])
 
 
-def _quadruped(skeleton: Skeleton, legs: Sequence[Leg], solved: Sequence[Leg], q: Array) -> Array:
-    """Feet below the hips, sideways where the neutral pose has them; knees behind, if the limits allow."""
+def _quadruped(skeleton: Skeleton, legs: Sequence[Leg], solved: Sequence[Leg], q: Array) -> list[Array]:
+    """Feet below the hips, sideways where the neutral pose has them; with knees on each side that the limits allow."""
     frames, axes = skeleton.frames(skeleton.neutral[None]), skeleton.axes(skeleton.neutral)
     trunk = ~np.any([skeleton.moves[leg.joints[0]] for leg in legs], axis=0)
     soles = [sole(skeleton, leg, leg.deepest) for leg in solved]
-    found = q
+    found = [q]
     for height in _HEIGHTS:
         ground = max(leg.hip[2] - height * leg.reach for leg in legs)
         aims = []
@@ -164,7 +174,7 @@ def _quadruped(skeleton: Skeleton, legs: Sequence[Leg], solved: Sequence[Leg], q
             x = neutral[0] if is_around else leg.hip[0]
             aims.append((np.array([x, neutral[1], ground + foot.radius]), is_around))
         found = _bent(skeleton, solved, soles, aims, q)
-        if skeleton.lowest(trunk, skeleton.frames(found[None]))[0] > ground + 0.05 * legs[0].reach:
+        if skeleton.lowest(trunk, skeleton.frames(found[0][None]))[0] > ground + 0.05 * legs[0].reach:
             break
     return found
 
@@ -175,23 +185,30 @@ def _bent(
     soles: Sequence[Sole],
     aims: Sequence[tuple[Array, bool]],
     q: Array,
-) -> Array:
-    """Knees of all legs on one side if their limits allow it, else each as it can."""
-    tries = []
-    for side in _SIDES:
-        own = [
+) -> list[Array]:
+    """Poses with the knees on each side that the limits allow, or one with each as it can; shapes ``(joints,)``."""
+    middle = float(np.mean([leg.hip[0] for leg in legs]))
+    tries = {
+        side: [
             solve(skeleton, leg, foot, Aim(place, None, side, radial), q)
             for leg, foot, (place, radial) in zip(legs, soles, aims, strict=True)
         ]
-        tries.append(own)
+        for side in (-1.0, 1.0)
+    }
+    choices = []
+    for front, hind in _SIDES:
+        own = [tries[front if leg.hip[0] > middle else hind][place] for place, leg in enumerate(legs)]
         if all(miss < _MISS * leg.reach for leg, (_, miss) in zip(legs, own, strict=True)):
-            break
-    else:
-        tries = [[min(of_leg, key=lambda tried: tried[1]) for of_leg in zip(*tries, strict=True)]]
-    found = q.copy()
-    for leg, (joints, _) in zip(legs, tries[-1], strict=True):
-        found[list(leg.joints)] = joints
-    return found
+            choices.append(own)
+    if not choices:
+        choices.append([min(of_leg, key=lambda tried: tried[1]) for of_leg in zip(*tries.values(), strict=True)])
+    poses = []
+    for choice in choices:
+        found = q.copy()
+        for leg, (joints, _) in zip(legs, choice, strict=True):
+            found[list(leg.joints)] = joints
+        poses.append(found)
+    return poses
 
 
 def _humanoid(skeleton: Skeleton, legs: Sequence[Leg], solved: Sequence[Leg], q: Array) -> Array:
