@@ -90,9 +90,16 @@ def episodes(
     return {"return": returns, **success, **last}
 
 
-def evaluate(task: str, act: Callable[[NDArray[np.float32]], NDArray[Any]], *, threads: int) -> dict[str, float]:
+def evaluate(
+    task: str,
+    act: Callable[[NDArray[np.float32]], NDArray[Any]],
+    *,
+    threads: int,
+    options: Mapping[str, Any] | None = None,
+) -> dict[str, float]:
     """Play one episode in each world, always the same ones; returns means of `episodes` over the worlds."""
-    return {name: float(values.mean()) for name, values in episodes(task, act, threads=threads).items()}
+    found = episodes(task, act, threads=threads, options=options)
+    return {name: float(values.mean()) for name, values in found.items()}
 
 
 def interval(values: Sequence[float] | NDArray[Any]) -> tuple[float, float]:

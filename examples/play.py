@@ -13,6 +13,7 @@ actions and the first observations of a few. It is ``out/play/TASK.png`` if ``--
 from __future__ import annotations
 
 import argparse
+import json
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -95,8 +96,9 @@ def main() -> None:
     out = args.out or OUT / f"{args.task.rpartition(':')[2]}.png"
 
     policy = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
+    made = json.loads(policy.get_modelmeta().custom_metadata_map.get("task_options", "{}"))
     mode = "human" if args.view else "rgb_array" if args.film else None
-    envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=mode)
+    envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=mode, **made)
     try:
         size = envs.single_observation_space.shape[0]
         expected = policy.get_inputs()[0].shape[1]

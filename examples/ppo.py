@@ -24,8 +24,9 @@ import argparse
 import copy
 import math
 import os
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -38,10 +39,12 @@ import numpy as np
 from numpy.typing import NDArray
 from training import draw, needed, report
 from training_log import Films, Log, Statistics
+from training_watch import TermWatch, nothing_learnt
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
 from tightloop.env import AutoresetMode, VectorEnv, policy_metadata
 from tightloop.env.mirror import MirrorColumns
+from tightloop.errors import TightloopError
 from tightloop.whole_files import whole_file
 
 # onnx and onnxscript are needed only at the end, for the policy's file
@@ -51,6 +54,7 @@ with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     from torch import Tensor, nn
     from tqdm import tqdm
 
+MODEL_MINUTES = 10.0  # for robots that are not the task's own, at least
 OUT = Path(__file__).resolve().parent.parent / "out" / "ppo"
 
 
@@ -195,12 +199,26 @@ class Trainer:
     One thread steps the worlds with a copy of the agent, while another learns from the rollout before.
     """
 
-    def __init__(self, task: str, seed: int, config: Config, folder: Path, *, daemon: str | None, device: str) -> None:
+    def __init__(
+        self,
+        task: str,
+        seed: int,
+        config: Config,
+        folder: Path,
+        *,
+        daemon: str | None,
+        device: str,
+        made: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Start the environment, in which `made` are the arguments of the task, such as its ``model``."""
         torch.set_num_threads(config.torch_threads)
         torch.manual_seed(seed)
         self.task, self.seed, self.config, self.folder = task, seed, config, folder
-        options: dict[str, Any] = {"threads": config.threads} if daemon is None else {"daemon": daemon}
-        self.envs = VectorEnv(task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **options)
+        self.made = dict(made or {})
+        options = {"threads": config.threads} if daemon is None else {"daemon": daemon}
+        self.envs = VectorEnv(
+            task, config.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, copy=False, **self.made, **options
+        )
         (inputs,), (actions,) = (self.envs.single_observation_space.shape, self.envs.single_action_space.shape)
         space = self.envs.evaluation.privileged_space
         critic_inputs = None if space is None else space.shape[0]
@@ -212,8 +230,8 @@ class Trainer:
         self.mirror = self.envs.mirror if config.symmetry else None
         # one each: the threads that collect and learn run at once
         self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
-        self.statistics = Statistics(config.num_envs)
-        self.films = Films(task, Path(folder), config.film_every, config.threads)
+        self.statistics, self.terms = Statistics(config.num_envs), TermWatch()
+        self.films = Films(task, self.made, Path(folder), config.film_every, config.threads)
         self.seconds, self.steps = 0.0, 0
         self.levels: NDArray[np.int32] | None = None  # of the curriculum, at the last checkpoint
         self.curve: list[dict[str, float]] = []
@@ -358,11 +376,13 @@ class Trainer:
                 news["time/steps_per_second"] = config.steps * config.num_envs / (now - rollout_begun)
                 news["time/training_s"] = self.seconds
                 bar.update(round(100 * self.progress) - bar.n)
+                if (warning := self.terms.see(news, self.seconds)) is not None:
+                    bar.write(f"warning: {warning}", file=sys.stderr)
                 if self._is_due(shown):
                     news |= learning.result()
                     self.acting.load_state_dict(self.agent.state_dict())
                     shown, learning = self.steps if config.total else self.seconds, None
-                    found = evaluate(self.task, self.act, threads=config.threads)
+                    found = evaluate(self.task, self.act, threads=config.threads, options=self.made)
                     self.curve.append({**found, "seconds": self.seconds, "steps": self.steps})
                     self.levels = self.envs.level
                     self.save()
@@ -428,6 +448,7 @@ def main() -> None:
         description="Train a policy.", formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     parser.add_argument("task", help=f"what to learn: {', '.join(PRESETS)}, or a task of your own, FILE.py:CLASS")
+    parser.add_argument("--model", type=Path, help="URDF or MJCF of a robot for a velocity task, instead of its own")
     parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in the folder")
     parser.add_argument("--daemon", help="name of a running daemon to join")
@@ -440,14 +461,21 @@ def main() -> None:
         parser.add_argument(f"--{option.name.replace('_', '-')}", help="changes the preset", **how)
     args = parser.parse_args()
     own = {option.name: getattr(args, option.name) for option in fields(Config)}
-    config = replace(
-        PRESETS.get(args.task, Config()), **{name: value for name, value in own.items() if value is not None}
-    )
+    preset = PRESETS.get(args.task, Config())
+    if args.model is not None:  # its gains and weights are found, not tuned
+        preset = replace(preset, minutes=max(preset.minutes, MODEL_MINUTES))
+    config = replace(preset, **{name: value for name, value in own.items() if value is not None})
 
-    folder = args.out / f"{args.task.rpartition(':')[2]}-{args.seed}"
+    made, robot = ({}, "") if args.model is None else ({"model": args.model}, f"-{args.model.stem}")
+    folder = args.out / f"{args.task.rpartition(':')[2]}{robot}-{args.seed}"
     with needed(*(["wandb"] if args.wandb else []), *(["av", "PIL"] if config.film_every else [])):
         folder.mkdir(parents=True, exist_ok=True)
-    trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device)
+    try:
+        trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device, made=made)
+    except TightloopError as problem:
+        if args.model is None:
+            raise
+        raise SystemExit(str(problem)) from None
     try:
         if args.resume and (folder / "checkpoint.pt").exists():
             trainer.resume()
@@ -459,8 +487,10 @@ def main() -> None:
         draw(trainer.curve, title, folder / "curve.png")
         policy = trainer.export()
         # not the episodes by which a run may have ended
-        found = episodes(args.task, trainer.act, threads=config.threads, seed=FINAL_SEED)
+        found = episodes(args.task, trainer.act, threads=config.threads, seed=FINAL_SEED, options=made)
         print(f"{end['seconds']:.0f} s, {end['steps']:,} steps: {told_with_intervals(found)}")
+        if (warning := nothing_learnt(trainer.curve)) is not None:
+            print(f"warning: {warning}", file=sys.stderr)
         print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
     finally:
         trainer.close()

@@ -112,16 +112,18 @@ class Log:
 class Films:
     """A film of the policy every so many minutes, ``FOLDER/films/STEPS.mp4``."""
 
-    def __init__(self, task: str, folder: Path, minutes: float, threads: int) -> None:
+    def __init__(self, task: str, made: Mapping[str, Any], folder: Path, minutes: float, threads: int) -> None:
         """Make no film yet.
 
         Args:
             task: Name of the task.
+            made: How the task is made.
             folder: Folder of the run.
             minutes: Between two films; 0 for none.
             threads: Most threads that a step of the simulation may use.
         """
-        self._task, self._folder, self._spacing, self._threads = task, folder / "films", 60.0 * minutes, threads
+        self._task, self._made, self._folder = task, made, folder / "films"
+        self._spacing, self._threads = 60.0 * minutes, threads
         self._next: float | None = None
 
     def take(self, act: Callable[[NDArray[np.float32]], NDArray[Any]], seconds: float, steps: int) -> None:
@@ -140,7 +142,7 @@ class Films:
             self._next = self._spacing * (seconds // self._spacing + 1.0)
         if not due:
             return
-        envs = VectorEnv(self._task, FILMED, threads=self._threads, render_mode="rgb_array")
+        envs = VectorEnv(self._task, FILMED, threads=self._threads, render_mode="rgb_array", **self._made)
         try:
             obs, _ = envs.reset(seed=0)
             with film_of(envs, self._folder / f"{steps}.mp4", None) as film:
