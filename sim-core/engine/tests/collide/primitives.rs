@@ -149,7 +149,10 @@ fn boxes_that_overlap_are_pushed_out_a_twentieth_beyond_the_short_way_at_most() 
         let (distance, _) = oracle(pair);
         for point in &found {
             let shown = separation(pair, point.normal);
-            assert!(point.distance > shown - DISTANCE * size, "{point:?} {pair:?}");
+            assert!(
+                point.distance > shown - DISTANCE * size,
+                "{point:?} {pair:?}"
+            );
         }
         // apart, an axis that separates them is not the way between their nearest points
         if distance > -0.01 * size {
