@@ -125,9 +125,11 @@ def assert_mujocos(model: mujoco.MjModel, frame: tl.Frame, qpos: Array) -> list[
         counts.append(data.ncon)
         qacc.append(data.qacc.copy())
         assert frame.contact_count[world] == data.ncon, f"{pose.tolist()}: {frame.contact_distance[world]}"
-        for at, contact in enumerate(data.contact):
+        for contact in data.contact:
             # our first shape is that which stands still
             way = -1.0 if contact.geom[0] else 1.0
+            # the corners of a box come in another order
+            at = int(np.abs(frame.contact_pos[world, : data.ncon] - contact.pos).sum(1).argmin())
             found = [getattr(frame, f"contact_{name}")[world, at] for name in ("pos", "distance", "normal")]
             assert np.abs(found[0] - contact.pos).max() < SAME, f"{pose.tolist()}: {found}, MuJoCo {contact.pos}"
             assert abs(found[1] - contact.dist) < SAME, f"{pose.tolist()}: {found}, MuJoCo {contact.dist}"
@@ -146,7 +148,8 @@ def test_points_and_accelerations_are_mujocos(name):
         frame = pair.place(at_rest(pair.model, qpos))
         counts = assert_mujocos(pair.model, frame, frame.qpos.astype(float))
     most = {"box": 2, "plane": 2}.get(still[0], 1) if free[0] == "capsule" else 1
-    assert min(counts) == 0
+    # small spheres start within the margin
+    assert min(counts) == (1 if name in ("sphere and cube", "sphere and plane") else 0)
     assert sum(count >= most for count in counts) > STATES // 20
 
 

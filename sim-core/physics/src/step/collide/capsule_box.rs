@@ -27,7 +27,6 @@ use super::select::{
 };
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::Vec3;
-use crate::when;
 
 /// An edge must be nearer by this to count before a face or an edge before it (MuJoCo: `mjMINVAL`) [m²].
 const NEARER: f64 = 1e-15;
@@ -100,18 +99,17 @@ pub(super) fn mujoco_capsule_box<C: Cx>(
     let rounding = size * radius * c(4.0 * <C::F as Num>::Real::EPSILON);
     let mut nearest = beside.nearest_end();
     beside.add_edges(&mut nearest, c(NEARER).max(rounding));
-    let touches = (nearest.square.sqrt() - radius).lt(pair.margin);
-    when!(cx, touches, {
-        let is_end = nearest.kind.lt(c(0.5));
-        let (from_end, of_end) = beside.way_from_end(&nearest);
-        let (from_edge, of_edge) = beside.way_from_edge(&nearest);
-        let exists = (is_end & of_end) | (!is_end & of_edge);
-        let way = C::F::select(is_end, from_end, from_edge);
-        let first = nearest.height * axis.half_height;
-        let second = (nearest.height + way) * axis.half_height;
-        add_ball_at(cx, pair, axis, first, touches, out);
-        add_ball_at(cx, pair, axis, second, touches & exists, out);
-    });
+    let is_end = nearest.kind.lt(c(0.5));
+    let (from_end, of_end) = beside.way_from_end(&nearest);
+    let (from_edge, of_edge) = beside.way_from_edge(&nearest);
+    let exists = (is_end & of_end) | (!is_end & of_edge);
+    let way = C::F::select(is_end, from_end, from_edge);
+    let first = nearest.height * axis.half_height;
+    let second = (nearest.height + way) * axis.half_height;
+    // an axis through the box may be farther from each edge than the radius, so each sphere decides by itself
+    let all = is_end | !is_end;
+    add_ball_at(cx, pair, axis, first, all, out);
+    add_ball_at(cx, pair, axis, second, exists, out);
 }
 
 impl<F: Num> Beside<F> {

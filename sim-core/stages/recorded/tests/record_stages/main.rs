@@ -195,7 +195,6 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
     let (free, tight) = (
         cases::shapes(Cone::Elliptic, None),
         cases::shapes(Cone::Pyramidal, Some(5)),
-        cases::shapes_as_mujoco(),
     );
     for case in [&free, &tight] {
         let m = &case.m;
