@@ -35,9 +35,13 @@ pub(crate) fn parts<'py>(
 
 /// A mesh file as it looks ([`VisualMesh`]), its arrays by name; `textures` is a list of dicts, `image` a path or bytes.
 #[pyfunction]
-pub(crate) fn visual_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+pub(crate) fn visual_mesh(
+    py: Python<'_>,
+    path: PathBuf,
+    collada_up_axis: bool,
+) -> PyResult<Bound<'_, PyDict>> {
     let mesh = py
-        .detach(|| VisualMesh::load(&path))
+        .detach(|| VisualMesh::load(&path, collada_up_axis))
         .map_err(|error| raise(py, "SceneError", ConfigError::from(error).to_string()))?;
     let colors: Vec<_> = mesh.colors.iter().map(|c| c.unwrap_or_default()).collect();
     let painted = mesh.colors.iter().map(Option::is_some);
@@ -53,6 +57,7 @@ pub(crate) fn visual_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, P
     found.set_item("painted", PyArray1::from_iter(py, painted))?;
     found.set_item("textures", textures)?;
     found.set_item("notes", mesh.notes)?;
+    found.set_item("ignored_up_axis", mesh.ignored_up_axis)?;
     Ok(found)
 }
 

@@ -17,6 +17,7 @@ pub(crate) fn read_urdf(
     strict: bool,
     mesh_max_hull_vertices: usize,
     convex_decomposition: bool,
+    collada_up_axis: bool,
 ) -> PyResult<String> {
     let options = UrdfOptions {
         package_dirs,
@@ -25,6 +26,7 @@ pub(crate) fn read_urdf(
         meshes: MeshOptions {
             max_hull_vertices: mesh_max_hull_vertices,
             convex_decomposition,
+            collada_up_axis,
         },
         ..UrdfOptions::default()
     };
@@ -46,6 +48,7 @@ pub(crate) fn read_mesh(
     let options = MeshOptions {
         max_hull_vertices,
         convex_decomposition,
+        ..MeshOptions::default()
     };
     config::mesh_summary(&path, scale, &options)
         .map(|summary| summary.to_string())

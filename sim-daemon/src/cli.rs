@@ -368,6 +368,10 @@ pub(crate) struct Inspect {
     #[arg(long)]
     pub(crate) convex_decomposition: bool,
 
+    /// Turn COLLADA meshes from their <up_axis> to z up, which RViz does not.
+    #[arg(long)]
+    pub(crate) collada_up_axis: bool,
+
     /// Draw the convex hulls that collide, instead of the meshes.
     #[arg(long, requires = "png")]
     pub(crate) hulls: bool,

@@ -133,6 +133,7 @@ pub fn stone(corners: &[[f64; 3]]) -> Shape {
         closed: true,
         hulls: vec![Hull::of(corners, 64).unwrap()],
         notes: Vec::new(),
+        ignored_up_axis: None,
     }))
 }
 

@@ -81,6 +81,7 @@ class Robot(Entity):
         strict: bool,
         mesh_max_hull_vertices: int,
         convex_decomposition: bool,
+        collada_up_axis: bool,
         surface: dict[str, Any],
         summary: dict[str, Any],
     ) -> None:
@@ -93,6 +94,7 @@ class Robot(Entity):
             "strict": strict,
             "mesh_max_hull_vertices": mesh_max_hull_vertices,
             "convex_decomposition": convex_decomposition,
+            "collada_up_axis": collada_up_axis,
             "surface": surface,
         }
         self.self_collisions = self_collisions
@@ -130,6 +132,11 @@ class Robot(Entity):
     def convex_decomposition(self) -> bool:
         """Whether concave collision meshes become several convex hulls."""
         return self._file["convex_decomposition"]
+
+    @property
+    def collada_up_axis(self) -> bool:
+        """Whether COLLADA meshes are turned from their ``<up_axis>`` to z up."""
+        return self._file["collada_up_axis"]
 
     @property
     def surface(self) -> dict[str, Any]:
@@ -262,6 +269,7 @@ class Robot(Entity):
             "strict": self.strict,
             "mesh_max_hull_vertices": self.mesh_max_hull_vertices,
             "convex_decomposition": self.convex_decomposition,
+            "collada_up_axis": self.collada_up_axis,
             **self.surface,
         } | own
 

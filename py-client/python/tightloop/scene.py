@@ -95,6 +95,7 @@ class Scene(SceneRandomization):
         strict: bool = False,
         mesh_max_hull_vertices: int = 64,
         convex_decomposition: bool = False,
+        collada_up_axis: bool = False,
         package_dirs: Sequence[str | os.PathLike[str]] = (),
         **surface: Unpack[Surface],
     ) -> Robot:
@@ -112,6 +113,8 @@ class Scene(SceneRandomization):
             mesh_max_hull_vertices: Largest number of vertices of the convex hull of a collision mesh, 8 to 1024.
                 `Robot.notes` reports an error of the hull above 1 mm or 1 % of the mesh.
             convex_decomposition: Whether a concave collision mesh becomes several convex hulls instead of one.
+            collada_up_axis: Whether COLLADA meshes are turned from their ``<up_axis>`` to z up. RViz does not, and many
+                exporters write ``Y_UP`` into files that are z up. ``<unit>`` always counts.
             package_dirs: Folders with the packages of ``package://`` paths; the folders above the file if left out.
             **surface: Contact parameters of all shapes of the file: ``mu``, ``ke``, ``kd``, ``kf``, ``margin``,
                 ``gap``, ``condim``, ``group``, see `tightloop.Surface`.
@@ -141,9 +144,10 @@ class Scene(SceneRandomization):
         folders = [str(folder) for folder in packages]
         vertices = checks.integer("add_urdf: mesh_max_hull_vertices", mesh_max_hull_vertices)
         decompose = checks.flag("add_urdf: convex_decomposition", convex_decomposition)
+        turn = checks.flag("add_urdf: collada_up_axis", collada_up_axis)
         floating, strict = checks.flag("add_urdf: floating", floating), checks.flag("add_urdf: strict", strict)
         self_collisions = checks.flag("add_urdf: self_collisions", self_collisions)
-        summary = json.loads(_core.read_urdf(str(urdf), folders, floating, strict, vertices, decompose))
+        summary = json.loads(_core.read_urdf(str(urdf), folders, floating, strict, vertices, decompose, turn))
         own_name = re.sub(r"[^A-Za-z0-9_.\-]", "_", summary["name"])
         name = checks.name("robot", own_name if name is None else name, self._names())
         robot = Robot(
@@ -157,6 +161,7 @@ class Scene(SceneRandomization):
             strict=strict,
             mesh_max_hull_vertices=vertices,
             convex_decomposition=decompose,
+            collada_up_axis=turn,
             surface=touch,
             summary=summary,
         )

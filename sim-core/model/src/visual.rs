@@ -46,6 +46,8 @@ pub enum Look {
         path: PathBuf,
         /// Factor on each axis of the file [–].
         scale: [f64; 3],
+        /// Whether a COLLADA file is turned from its `<up_axis>` to z up.
+        collada_up_axis: bool,
     },
     /// What cannot be shown.
     Nothing {

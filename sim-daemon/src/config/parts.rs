@@ -31,7 +31,7 @@ impl SceneFile {
     /// along x and y. A visual that is a plane has `half_extents`, `null` where it has no end. Collisions also have `added`
     /// (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh before it became hulls, else
     /// as `mesh`); visuals have `color` (red, green, blue and opacity, 0 to 1, or `null`), `texture` (a file or `null`),
-    /// `file` with `scale` where it is one, and `problem` where it cannot be shown.
+    /// `file` with `scale` and `collada_up_axis` where it is one, and `problem` where it cannot be shown.
     ///
     /// # Errors
     /// As [`SceneFile::describe`].
@@ -79,8 +79,7 @@ impl SceneFile {
         // robots from files come first, in the order of their tables, then models
         let (robots, models) = description.robots.split_at(self.robots.len());
         for (table, robot) in self.robots.iter().zip(robots) {
-            let packages = table.options(base_dir).package_dirs;
-            let found = Robot::visuals(base_dir.join(&table.urdf), &packages);
+            let found = Robot::visuals(base_dir.join(&table.urdf), &table.options(base_dir));
             self.robot_visuals(robot, found, drawing);
         }
         for (table, robot) in self.mujoco.iter().zip(models) {
@@ -218,8 +217,13 @@ impl Drawing {
                 part["shape"] = json!(kind);
                 part["mesh"] = json!(self.shared(surface));
             }
-            Look::File { path, scale } => {
+            Look::File {
+                path,
+                scale,
+                collada_up_axis,
+            } => {
                 part["shape"] = json!("mesh");
+                part["collada_up_axis"] = json!(collada_up_axis);
                 part["file"] = json!(path.to_string_lossy());
                 part["scale"] = json!(scale);
             }

@@ -45,6 +45,9 @@ pub struct RobotTable {
     /// Whether a concave collision mesh becomes several convex hulls.
     #[serde(default)]
     pub convex_decomposition: bool,
+    /// Whether the `<up_axis>` of COLLADA meshes is applied; RViz leaves it out.
+    #[serde(default)]
+    pub collada_up_axis: bool,
     /// Whether its own links touch each other.
     #[serde(default)]
     pub self_collisions: bool,
@@ -129,6 +132,7 @@ impl RobotTable {
             meshes: MeshOptions {
                 max_hull_vertices: self.mesh_max_hull_vertices,
                 convex_decomposition: self.convex_decomposition,
+                collada_up_axis: self.collada_up_axis,
             },
             package_dirs: self
                 .package_dirs

@@ -169,7 +169,17 @@ pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
         reason,
     };
     let bytes = files::read(path, SCENE_MAX).map_err(|error| fault(error.reason()))?;
-    let text = String::from_utf8(bytes).map_err(|_| fault("it is not UTF-8 text".to_owned()))?;
+    let wide = [b"\xff\xfe", b"\xfe\xff"]
+        .iter()
+        .any(|mark| bytes.starts_with(*mark));
+    let text = String::from_utf8(bytes).map_err(|_| {
+        let encoding = if wide {
+            "it is UTF-16 text"
+        } else {
+            "it is not UTF-8 text"
+        };
+        fault(format!("{encoding}; save it as UTF-8"))
+    })?;
     parse(&text, &path.display().to_string())
 }
 
@@ -178,6 +188,8 @@ pub fn load(path: &Path) -> Result<SceneFile, ConfigError> {
 /// # Errors
 /// Text that is not TOML, or an entry that is unknown or of a wrong type, with its line.
 pub fn parse(text: &str, place: &str) -> Result<SceneFile, ConfigError> {
+    // a byte order mark, as editors of Windows write one
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim_start().starts_with('<') {
         return Err(syntax(place, XML));
     }

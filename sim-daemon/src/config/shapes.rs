@@ -244,6 +244,7 @@ impl ShapeTable {
                 let options = MeshOptions {
                     max_hull_vertices: self.max_hull_vertices.unwrap_or(defaults.max_hull_vertices),
                     convex_decomposition: self.convex_decomposition.unwrap_or_default(),
+                    ..defaults
                 };
                 return Shape::mesh(&path, scale, &options)
                     .or_else(|error| refuse(error.to_string()));

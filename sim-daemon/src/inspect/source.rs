@@ -25,6 +25,7 @@ pub(super) fn exported(args: &Inspect) -> Option<&Path> {
 pub(super) fn urdf(args: &Inspect) -> Result<Description, DaemonError> {
     let mut meshes = MeshOptions {
         convex_decomposition: args.convex_decomposition,
+        collada_up_axis: args.collada_up_axis,
         ..MeshOptions::default()
     };
     if let Some(vertices) = args.mesh_max_hull_vertices {
@@ -63,6 +64,11 @@ pub(super) fn mujoco(args: &Inspect, path: &Path, name: &str) -> Result<Descript
             args.convex_decomposition,
             "--convex-decomposition",
             "a mesh touches as its convex hull",
+        ),
+        (
+            args.collada_up_axis,
+            "--collada-up-axis",
+            "MuJoCo has read its meshes",
         ),
     ] {
         if given {

@@ -24,6 +24,9 @@ from tightloop.view import paint, sheets, visual_mesh
 from tightloop.view.subject import Subject, subject
 from tightloop.view.visual_mesh import VisualMesh
 
+# Most files in a note.
+_LISTED_MAX = 8
+
 Kind = Literal["visual", "collision"]
 Color = tuple[int, int, int, int]
 
@@ -115,7 +118,9 @@ class _Assembly:
     def __init__(self, surfaces: Sequence[tuple[Any, Any]], body_names: Sequence[str]) -> None:
         self._surfaces = surfaces
         self._places = {name: place for place, name in enumerate(body_names)}
-        self._files: dict[str, VisualMesh | SceneError] = {}
+        self._files: dict[tuple[str, bool], VisualMesh | SceneError] = {}
+        # of each robot, COLLADA files whose up axis is not applied
+        self._unturned: dict[str, dict[str, None]] = {}
         self._images: dict[str, Color | None] = {}
         self._meshes: dict[Any, Mesh] = {}
         self._notes: list[str] = []
@@ -136,6 +141,12 @@ class _Assembly:
                 lost.add(entry["body"])
             else:
                 seen.setdefault(entry["body"], []).append(part)
+        for robot, files in self._unturned.items():
+            named = ", ".join([*files][:_LISTED_MAX]) + (", …" if len(files) > _LISTED_MAX else "")
+            self._note(
+                f"robot `{robot}`: the <up_axis> of COLLADA files is not applied, as in RViz; if their parts lie wrong, "
+                f"set collada_up_axis: {named}"
+            )
         dressed = {entry["robot"] for entry in visuals}
         made = []
         clad = {entry["robot"] for entry in visuals if entry["body"] in seen and entry["body"] not in lost}
@@ -164,7 +175,7 @@ class _Assembly:
         if entry["shape"] == "plane":
             mesh = self._sheet(entry["half_extents"], own or paint.PLAIN)
         elif "file" in entry:
-            mesh = self._of_file(entry["file"], tuple(entry["scale"]), own)
+            mesh = self._of_file(entry, own)
         else:
             mesh = self._of_surface(entry["mesh"], own or paint.PLAIN, entry.get("squares"))
         return self._part(entry, "visual", mesh)
@@ -183,22 +194,26 @@ class _Assembly:
                 return self._images[image]
         return None if entry["color"] is None else paint.of_floats(entry["color"])
 
-    def _of_file(self, file: str, scale: tuple[float, ...], own: Color | None) -> Mesh:
+    def _of_file(self, entry: dict[str, Any], own: Color | None) -> Mesh:
         """A mesh file, in the robot's colour where it has one and the mesh has not several of its own."""
-        found = self._files.get(file)
+        file, scale, turned = entry["file"], tuple(entry["scale"]), entry["collada_up_axis"]
+        found = self._files.get((file, turned))
         if found is None:
             try:
-                found = visual_mesh.read(file)
+                found = visual_mesh.read(file, collada_up_axis=turned)
                 for note in found.notes:
                     self._note(f"visual mesh {Path(file).name} {note}")
             except SceneError as error:
                 found = error
-            self._files[file] = found
+            self._files[file, turned] = found
         if isinstance(found, SceneError):
             raise found
+        if found.ignored_up_axis is not None:
+            files = self._unturned.setdefault(entry["robot"], {})
+            files.setdefault(f"{Path(file).name} ({found.ignored_up_axis})")
         # most files of one colour have it from an exporter's default
         whole = own is not None and found.is_plain
-        key = file, scale, own if whole or not found.painted.all() else None
+        key = file, turned, scale, own if whole or not found.painted.all() else None
         if key not in self._meshes:
             scaled = found.scaled(scale)
             self._meshes[key] = Mesh(scaled.vertices, scaled.faces, scaled.filled(own or paint.PLAIN, whole=whole))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from os import PathLike, fspath
 from typing import Any
@@ -26,6 +26,7 @@ class VisualMesh:
         colors: Red, green, blue and opacity of each face, 0 to 255, shape ``(faces, 4)``.
         painted: Which faces have a colour in the file; the others' colours mean nothing. Shape ``(faces,)``.
         notes: What was done to it that its author may not expect, a sentence each without a subject.
+        ignored_up_axis: The axis that a COLLADA file says is up, where that is not z and was not applied.
     """
 
     vertices: NDArray[np.float32]
@@ -33,12 +34,13 @@ class VisualMesh:
     colors: Colors
     painted: NDArray[np.bool_]
     notes: list[str]
+    ignored_up_axis: str | None = None
 
     def scaled(self, scale: Sequence[float]) -> VisualMesh:
         """The same with each axis multiplied; a mirror keeps the outside outside."""
         faces = self.faces[:, ::-1] if np.prod(scale) < 0 else self.faces
         vertices = (self.vertices * np.asarray(scale)).astype(np.float32)
-        return VisualMesh(vertices, np.ascontiguousarray(faces), self.colors, self.painted, self.notes)
+        return replace(self, vertices=vertices, faces=np.ascontiguousarray(faces))
 
     @property
     def is_plain(self) -> bool:
@@ -53,17 +55,21 @@ class VisualMesh:
         return colors
 
 
-def read(path: str | PathLike[str]) -> VisualMesh:
+def read(path: str | PathLike[str], *, collada_up_axis: bool = True) -> VisualMesh:
     """Read a COLLADA, OBJ, STL or glTF file.
 
     A face with an image has the colour that the image shows where the face lies. One whose image cannot be read has the
     colour of its material.
 
+    Args:
+        path: The file.
+        collada_up_axis: Whether a COLLADA file is turned from its ``<up_axis>`` to z up.
+
     Raises:
         SceneError: The file cannot be read; the message says why.
         MissingLibrary: The file has images, and pillow is not installed.
     """
-    found = _core.visual_mesh(fspath(path))
+    found = _core.visual_mesh(fspath(path), collada_up_axis)
     colors, painted, notes = found["colors"], found["painted"], found["notes"]
     if found["textures"]:
         dependencies.check("PIL")
@@ -77,7 +83,7 @@ def read(path: str | PathLike[str]) -> VisualMesh:
             continue
         colors[faces] = np.round(sampled * (texture["tints"] / 255.0)).astype(np.uint8)
         painted[faces] = True
-    return VisualMesh(found["vertices"], found["faces"], colors, painted, notes)
+    return VisualMesh(found["vertices"], found["faces"], colors, painted, notes, found["ignored_up_axis"])
 
 
 def _sampled(image: str | bytes, uv: NDArray[np.float32] | None) -> NDArray[Any]:

@@ -145,6 +145,7 @@ fn mesh(hull: &Hull) -> Mesh {
         closed: true,
         hulls: vec![hull.clone()],
         notes: Vec::new(),
+        ignored_up_axis: None,
     }
 }
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::hull::Hull;
-use super::load::load;
+use super::load::{Loaded, load};
 use super::parry::convex_parts;
 use super::polytope::triangles_around;
 use super::trimesh::TriMesh;
@@ -35,6 +35,8 @@ pub struct MeshOptions {
     pub max_hull_vertices: usize,
     /// Whether a concave mesh becomes several convex hulls; otherwise it becomes its convex hull.
     pub convex_decomposition: bool,
+    /// Whether a COLLADA file is turned from its `<up_axis>` to z up. Its `<unit>` always counts.
+    pub collada_up_axis: bool,
 }
 
 impl Default for MeshOptions {
@@ -42,6 +44,7 @@ impl Default for MeshOptions {
         MeshOptions {
             max_hull_vertices: 64,
             convex_decomposition: false,
+            collada_up_axis: true,
         }
     }
 }
@@ -78,6 +81,8 @@ pub struct Mesh {
     pub hulls: Vec<Hull>,
     /// What was done to it that its author may not expect, a sentence each without a subject.
     pub notes: Vec<String>,
+    /// The axis that its file says is up, where that is not z and was not applied.
+    pub ignored_up_axis: Option<&'static str>,
 }
 
 impl Mesh {
@@ -87,7 +92,11 @@ impl Mesh {
     /// Why the file cannot be used, by its path, with the cure.
     pub fn load(path: &Path, scale: [f64; 3], options: &MeshOptions) -> Result<Mesh, ModelError> {
         options.validate()?;
-        let (mut triangles, notes) = load(path).map_err(|reason| fault(path, reason))?;
+        let Loaded {
+            mut triangles,
+            notes,
+            ignored_up_axis,
+        } = load(path, options.collada_up_axis).map_err(|reason| fault(path, reason))?;
         for vertex in &mut triangles.vertices {
             for axis in 0..3 {
                 vertex[axis] *= scale[axis];
@@ -97,7 +106,11 @@ impl Mesh {
         if scale.iter().product::<f64>() < 0.0 {
             triangles.turn_over();
         }
-        Mesh::made(path, scale, triangles, None, notes, options)
+        let mesh = Mesh::made(path, scale, triangles, None, notes, options)?;
+        Ok(Mesh {
+            ignored_up_axis,
+            ..mesh
+        })
     }
 
     /// A mesh by its name, of these triangles; its hull is that of some of its vertices, or of all.
@@ -142,6 +155,7 @@ impl Mesh {
             closed,
             hulls: Vec::new(),
             notes,
+            ignored_up_axis: None,
         };
         mesh.make_hulls(size, hull, options)?;
         Ok(mesh)

@@ -54,14 +54,17 @@ pub struct VisualMesh {
     pub textures: Vec<Texture>,
     /// What was done to it that its author may not expect, a sentence each without a subject.
     pub notes: Vec<String>,
+    /// The axis that its file says is up, where that is not z and was not applied.
+    pub ignored_up_axis: Option<&'static str>,
 }
 
 impl VisualMesh {
     /// Reads a mesh file, vertices at the same place joined; of more than [`TRIANGLES_SHOWN_MAX`] triangles, fewer are made.
+    /// `collada_up_axis` as in [`super::MeshOptions`].
     ///
     /// # Errors
     /// Why the file cannot be used, by its path, with the cure. Materials and images that are broken are no reason.
-    pub fn load(path: &Path) -> Result<VisualMesh, ModelError> {
+    pub fn load(path: &Path, collada_up_axis: bool) -> Result<VisualMesh, ModelError> {
         let fault = |reason| ModelError::Mesh {
             owner: String::new(),
             path: path.to_owned(),
@@ -72,7 +75,8 @@ impl VisualMesh {
             triangles,
             runs,
             notes,
-        } = read(path, true).map_err(fault)?;
+            ignored_up_axis,
+        } = read(path, true, collada_up_axis).map_err(fault)?;
         let (vertices, triangles, mut origins) = joined(&vertices, &triangles);
         if triangles.is_empty() {
             return Err(fault(NO_AREA.to_owned()));
@@ -81,6 +85,7 @@ impl VisualMesh {
             vertices,
             triangles,
             notes,
+            ignored_up_axis,
             ..VisualMesh::default()
         };
         if let Some(kept) = mesh.thin() {

@@ -107,6 +107,7 @@ impl<'a> Meshes<'a> {
             &MeshOptions {
                 max_hull_vertices: options.max_hull_vertices,
                 convex_decomposition: false,
+                collada_up_axis: false,
             },
         )?;
         Ok(Shape::Mesh(Arc::new(mesh)))

@@ -9,6 +9,7 @@ use urdf_rs::Geometry;
 use super::mesh::{self, Found};
 use super::reader::Reader;
 use super::scan::children;
+use super::xml::short;
 use crate::description::{Collision, Inertial, Link, Shape};
 use crate::error::ModelError;
 use crate::geometry::{self, Mesh};
@@ -114,6 +115,13 @@ impl Reader<'_, '_> {
         for note in &mesh.notes {
             self.notes
                 .push(format!("link `{link}`: mesh {} {note}", key.0.display()));
+        }
+        if let Some(axis) = mesh.ignored_up_axis {
+            let file = key.0.file_name().unwrap_or_default().to_string_lossy();
+            let named = (short(&file), axis);
+            if !self.unturned.contains(&named) {
+                self.unturned.push(named);
+            }
         }
         Ok(self.meshes.entry(key).or_insert(Arc::new(mesh)).clone())
     }

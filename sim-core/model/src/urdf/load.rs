@@ -66,6 +66,7 @@ impl Robot {
             robot: String::new(),
             notes,
             missing_visuals: Vec::new(),
+            unturned: Vec::new(),
             meshes: HashMap::new(),
         };
         let mut robot = reader.robot()?;

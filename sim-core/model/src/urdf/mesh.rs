@@ -23,19 +23,21 @@ pub(super) enum Found {
 
 /// Resolves a path of a URDF file that lies in `folder`.
 ///
-/// `package://name/rest` is looked for in each package folder, then in the folders above the file that bear or hold that
-/// name; `rest` stays inside. Copies of a package often bear another name: where none of those is found, the file's own folder
-/// and the one above it stand for the package. A relative path is looked for from the file's folder and may climb, but only within what
-/// belongs to the robot: the nearest folder above the file with a `package.xml`, else the folder above the file's own (files
-/// lie in `urdf/` beside `meshes/`), and any package folder that holds the file. An absolute path, plain or `file://`, says
-/// openly where it leads and is taken as it is; only regular files of a mesh format are ever opened. Symbolic links are
-/// followed wherever they lead: a URDF file cannot make one, and workspaces are installed as links to their sources.
+/// `package://name/rest` or `model://name/rest`, with any number of slashes, is looked for in each package folder, then in
+/// the folders above the file that bear or hold that name; `rest` stays inside. Copies of a package often bear another name:
+/// where none of those is found, the file's own folder and the one above it stand for the package. A relative path is looked
+/// for from the file's folder and may climb, but only within what belongs to the robot: the nearest folder above the file
+/// with a `package.xml`, else the folder above the file's own (files lie in `urdf/` beside `meshes/`), and any package
+/// folder that holds the file. An absolute path, plain or `file://`, says openly where it leads and is taken as it is; only
+/// regular files of a mesh format are ever opened. Symbolic links are followed wherever they lead: a URDF file cannot make
+/// one, and workspaces are installed as links to their sources.
 pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {
-    let packaged = uri
-        .strip_prefix("package://")
-        .or_else(|| uri.strip_prefix("model://"));
-    let candidates = if let Some(rest) = packaged {
+    let (scheme, rest) = split_scheme(uri);
+    let candidates = if let Some("package" | "model") = scheme.as_deref() {
+        // writers of URDF put paths together with more slashes than one
+        let rest = rest.trim_start_matches('/');
         let (package, rest) = rest.split_once('/').unwrap_or((rest, ""));
+        let rest = rest.trim_start_matches('/');
         if escapes(Path::new(rest)) || package == ".." {
             return Found::Refused("it leaves its package by `..`; keep it inside");
         }
@@ -45,12 +47,10 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
         }
         candidates
     } else {
-        let path = match uri.strip_prefix("file://") {
-            Some(path) => Path::new(path),
-            None if uri.contains("://") => {
-                return Found::Refused("it must be package://, file:// or a path");
-            }
-            None => Path::new(uri),
+        let path = match scheme.as_deref() {
+            None => Path::new(rest),
+            Some("file") => Path::new(of_this_computer(rest)),
+            Some(_) => return Found::Refused("it must be package://, model://, file:// or a path"),
         };
         if path.is_relative() && leaves_robot(path, folder, package_dirs) {
             return Found::Refused(
@@ -62,6 +62,30 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
     match candidates.iter().find(|candidate| candidate.is_file()) {
         Some(file) => Found::File(file.clone()),
         None => Found::Missing(candidates),
+    }
+}
+
+/// The scheme of a path in small letters, and what follows its colon and two slashes. `file:` and `package:` may have one
+/// slash, as in RFC 8089.
+fn split_scheme(uri: &str) -> (Option<String>, &str) {
+    let none = (None, uri);
+    let Some((scheme, rest)) = uri.split_once(':') else {
+        return none;
+    };
+    let scheme = scheme.trim_start().to_ascii_lowercase();
+    let known = matches!(scheme.as_str(), "file" | "package" | "model");
+    match rest.strip_prefix("//") {
+        Some(rest) => (Some(scheme), rest),
+        None if known && rest.starts_with('/') => (Some(scheme), rest),
+        None => none,
+    }
+}
+
+/// The path of a `file://` address, without the host where that is this computer.
+fn of_this_computer(rest: &str) -> &str {
+    match rest.strip_prefix("localhost") {
+        Some(path) if path.starts_with('/') => path,
+        _ => rest,
     }
 }
 

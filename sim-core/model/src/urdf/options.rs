@@ -6,7 +6,7 @@ use crate::geometry::MeshOptions;
 use crate::pose::Pose;
 
 /// How a URDF file joins a scene.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UrdfOptions {
     /// Name of the robot in the scene; `None` takes the file's.
     pub name: Option<String>,
@@ -18,10 +18,28 @@ pub struct UrdfOptions {
     pub self_collisions: bool,
     /// Whether an inertia that no body can have is refused; otherwise it is balanced, with a warning.
     pub strict: bool,
-    /// How collision meshes become convex hulls.
+    /// How collision meshes become convex hulls. In a URDF file COLLADA's `<up_axis>` is not applied unless it is asked for:
+    /// exporters write `Y_UP` into files that are z up, and RViz leaves these as they are.
     pub meshes: MeshOptions,
     /// Folders that hold the packages of `package://` paths.
     pub package_dirs: Vec<PathBuf>,
+}
+
+impl Default for UrdfOptions {
+    fn default() -> UrdfOptions {
+        UrdfOptions {
+            name: None,
+            pose: Pose::identity(),
+            floating: false,
+            self_collisions: false,
+            strict: false,
+            meshes: MeshOptions {
+                collada_up_axis: false,
+                ..MeshOptions::default()
+            },
+            package_dirs: Vec::new(),
+        }
+    }
 }
 
 impl UrdfOptions {

@@ -28,6 +28,8 @@ pub(super) struct Reader<'a, 'input> {
     pub notes: Vec<String>,
     /// `link`: file, of visual meshes that are not there.
     pub missing_visuals: Vec<String>,
+    /// Names of COLLADA files whose up axis is not applied, with that axis.
+    pub unturned: Vec<(String, &'static str)>,
     /// Meshes read so far, by file and the bits of their scale.
     pub meshes: HashMap<(PathBuf, [u64; 3]), Arc<Mesh>>,
 }
@@ -56,6 +58,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let joints = self.joints(&urdf)?;
         let mut notes = self.scan.notes();
         notes.append(&mut self.notes);
+        notes.extend(unturned_note(&self.unturned));
         let mut robot = Robot {
             name: self.robot.clone(),
             pose: self.options.pose.normalized(),
@@ -109,11 +112,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         if self.missing_visuals.is_empty() {
             return Vec::new();
         }
-        let shown = &self.missing_visuals[..self.missing_visuals.len().min(LISTED_MAX)];
-        let mut files = shown.join(", ");
-        if shown.len() < self.missing_visuals.len() {
-            files += ", …";
-        }
+        let files = listed(&self.missing_visuals);
         vec![format!(
             "visual meshes are missing, which only a picture would show: {files}; give package_dirs= or mend the paths"
         )]
@@ -122,4 +121,30 @@ impl<'a, 'input> Reader<'a, 'input> {
     pub(super) fn folder(&self) -> &'a Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
+}
+
+/// The first few, separated by commas.
+fn listed(files: &[String]) -> String {
+    let shown = &files[..files.len().min(LISTED_MAX)];
+    let more = if shown.len() < files.len() {
+        ", …"
+    } else {
+        ""
+    };
+    shown.join(", ") + more
+}
+
+/// One note on all COLLADA files of a robot that say another axis than z is up, each with that axis.
+fn unturned_note(files: &[(String, &str)]) -> Option<String> {
+    if files.is_empty() {
+        return None;
+    }
+    let named: Vec<String> = files
+        .iter()
+        .map(|(file, axis)| format!("{file} ({axis})"))
+        .collect();
+    Some(format!(
+        "the <up_axis> of COLLADA files is not applied, as in RViz; if their parts lie wrong, set collada_up_axis: {}",
+        listed(&named)
+    ))
 }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::Node;
 
 use super::mesh::{self, Found};
+use super::options::UrdfOptions;
 use super::scan::{Scan, children};
 use super::table::{Attribute, GEOMETRY, Need, ORIGIN, Tag};
 use super::xml::short;
@@ -20,14 +21,11 @@ use crate::pose::Pose;
 use crate::visual::{Look, Visual, Visuals};
 
 impl Robot {
-    /// Reads what the links of a URDF file look like; files are looked for as those of collisions are.
+    /// Reads what the links of a URDF file look like; files are looked for and turned as those of collisions are.
     ///
     /// # Errors
     /// What is wrong with the file apart from its visuals.
-    pub fn visuals(
-        path: impl AsRef<Path>,
-        package_dirs: &[PathBuf],
-    ) -> Result<Visuals, ModelError> {
+    pub fn visuals(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Visuals, ModelError> {
         let path = path.as_ref();
         let mut notes = Vec::new();
         let text = source::read(path, &mut notes)?;
@@ -36,7 +34,8 @@ impl Robot {
         let scan = Scan::new(&document, path)?;
         let mut looks = Looks {
             folder: path.parent().unwrap_or(Path::new("")),
-            package_dirs,
+            package_dirs: &options.package_dirs,
+            collada_up_axis: options.meshes.collada_up_axis,
             quaternions: scan.has_quaternions(),
             named: HashMap::new(),
             // what else there is to say of the file, the robot says
@@ -77,6 +76,7 @@ struct Material {
 struct Looks<'a> {
     folder: &'a Path,
     package_dirs: &'a [PathBuf],
+    collada_up_axis: bool,
     /// Whether `quat_xyzw` counts.
     quaternions: bool,
     named: HashMap<String, Material>,
@@ -204,7 +204,11 @@ impl Looks<'_> {
                 let path = self
                     .find(uri)
                     .map_err(|problem| format!("mesh {problem}"))?;
-                return Ok(Look::File { path, scale });
+                return Ok(Look::File {
+                    path,
+                    scale,
+                    collada_up_axis: self.collada_up_axis,
+                });
             }
         }))
     }

@@ -67,6 +67,64 @@ fn one_brick_weighs_the_same_in_every_format() {
     }
 }
 
+/// A text in UTF-16, low bytes first or last, after its byte order mark.
+fn utf16(text: &str, low_first: bool) -> Vec<u8> {
+    let units = "\u{feff}".encode_utf16().chain(text.encode_utf16());
+    let bytes = units.map(|unit| match low_first {
+        true => unit.to_le_bytes(),
+        false => unit.to_be_bytes(),
+    });
+    bytes.flatten().collect()
+}
+
+#[test]
+fn a_byte_order_mark_changes_nothing() {
+    let folder = Folder::new("mark");
+    let brick = brick();
+    let y_up = mapped(&brick, |[x, y, z]| [x, z, -y]);
+    folder.put("brick.bin", gltf_buffer(&y_up));
+    // without its comments, the first line is a vertex: lost, it would shift every face
+    let bare = obj(&brick).replace("# a comment\nmtllib none.mtl\no one\n", "");
+    let repeated = bare.replace("\nv ", "\n\u{feff}v ");
+    let texts = [
+        ("a.obj", bare.clone()),
+        ("mac.obj", bare.replace('\n', "\r")),
+        ("repeated.obj", repeated),
+        ("hidden.obj", format!("\u{200b}{bare}")),
+        ("a.stl", stl_text(&brick)),
+        ("a.dae", dae(&brick, "<up_axis>Z_UP</up_axis>", PLAIN)),
+        (
+            "a.gltf",
+            gltf(&y_up, "\"uri\":\"brick.bin\",", r#"{"mesh":0}"#),
+        ),
+    ];
+    for (name, text) in texts {
+        let mesh = folder.load(name, format!("\u{feff}{text}"));
+        assert_is_the_brick(&mesh.unwrap_or_else(|error| panic!("{name}: {error}")));
+        for bytes in [
+            utf16(&text, true),
+            utf16(&text, false),
+            utf16(&text, true)[2..].to_vec(),
+        ] {
+            let error = folder.load(name, bytes).unwrap_err().to_string();
+            assert!(
+                error.contains("it is UTF-16 or UTF-32 text; save it as UTF-8"),
+                "{error}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_binary_file_may_begin_with_the_bytes_of_a_mark() {
+    let folder = Folder::new("binary-mark");
+    for start in [&b"\xef\xbb\xbfsolid"[..], b"\xff\xfes\0o\0l\0i\0d\0"] {
+        let mut bytes = stl(&brick());
+        bytes[..start.len()].copy_from_slice(start);
+        assert_is_the_brick(&folder.load("a.stl", bytes).unwrap());
+    }
+}
+
 #[test]
 fn text_keeps_the_digits_that_f32_would_lose() {
     let folder = Folder::new("digits");
@@ -100,7 +158,7 @@ fn cube_at(pos: [f64; 3]) -> sim_model::Inertial {
 }
 
 #[test]
-fn collada_units_and_up_axes_become_metres_and_z_up() {
+fn collada_units_and_up_axes_become_metres_and_z_up_outside_of_urdf() {
     let folder = Folder::new("axes");
     let inches = |[x, y, z]: [f64; 3]| [x / 0.0254, y / 0.0254, z / 0.0254];
     // where each convention has our x, y, z

@@ -17,7 +17,7 @@ const Z_UP: &str = "<up_axis>Z_UP</up_axis>";
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 
 fn look(path: &Path) -> VisualMesh {
-    VisualMesh::load(path).unwrap_or_else(|error| panic!("{error}"))
+    VisualMesh::load(path, true).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[track_caller]
@@ -479,7 +479,7 @@ fn files_without_a_surface_are_refused_by_name() {
         ("c.obj", "v 0 0 1e30\nf 1 1 1\n", "finite numbers"),
         ("d.blend", "", "`.blend` is not read"),
     ] {
-        let error = VisualMesh::load(&folder.put(name, bytes)).unwrap_err();
+        let error = VisualMesh::load(&folder.put(name, bytes), true).unwrap_err();
         let message = error.to_string();
         assert!(
             message.contains(reason) && message.contains(name),

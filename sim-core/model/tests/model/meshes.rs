@@ -95,6 +95,143 @@ fn relative_absolute_and_file_paths_are_followed() {
 }
 
 #[test]
+fn more_slashes_than_needed_lead_to_the_same_file() {
+    let package = Package::new("slashes");
+    let absolute = package.mesh().display().to_string();
+    let uris = [
+        "package://pkg//meshes/hand.stl".to_owned(),
+        "package:///pkg/meshes/hand.stl".to_owned(),
+        "package://pkg///meshes////hand.stl".to_owned(),
+        "package:/pkg/meshes/hand.stl".to_owned(),
+        "PACKAGE://pkg/./meshes//hand.stl".to_owned(),
+        "model://pkg/meshes/hand.stl".to_owned(),
+        "model://pkg//meshes//hand.stl".to_owned(),
+        "model:////pkg//meshes/hand.stl".to_owned(),
+        "..//meshes//hand.stl".to_owned(),
+        format!("file://{absolute}"),
+        format!("file:{absolute}"),
+        format!("file:///{absolute}"),
+        format!("file://localhost{absolute}"),
+        format!("/{absolute}"),
+    ];
+    for uri in uris {
+        for element in ["collision", "visual"] {
+            let robot = package.read("pkg/urdf", element, &uri, UrdfOptions::default());
+            assert_eq!(
+                robot.as_ref().unwrap().warnings,
+                Vec::<String>::new(),
+                "{uri}"
+            );
+            if element == "collision" {
+                assert_leads_to(robot, &package.mesh());
+            }
+        }
+    }
+}
+
+#[test]
+fn more_slashes_lead_out_of_no_package() {
+    let package = Package::new("slashes-out");
+    for uri in [
+        "package://pkg//../../secret.stl",
+        "model:///..//pkg/meshes/hand.stl",
+    ] {
+        let error = package.read("pkg/urdf", "collision", uri, UrdfOptions::default());
+        assert_says(
+            &error.unwrap_err().to_string(),
+            &["leaves its package", "`..`"],
+        );
+    }
+}
+
+/// A COLLADA file of a box of 0.1 x 0.2 x 0.6 m that says this of its units and axes.
+fn collada(asset: &str) -> String {
+    let corners: Vec<String> = (0..8)
+        .map(|i| {
+            let half = |bit: usize, size: f64| {
+                if i >> bit & 1 == 1 {
+                    0.5 * size
+                } else {
+                    -0.5 * size
+                }
+            };
+            format!("{} {} {}", half(0, 10.0), half(1, 20.0), half(2, 60.0))
+        })
+        .collect();
+    let faces = "0 2 3 0 3 1 4 5 7 4 7 6 0 1 5 0 5 4 2 6 7 2 7 3 0 4 6 0 6 2 1 3 7 1 7 5";
+    format!(
+        "<COLLADA version=\"1.4.1\"><asset><unit meter=\"0.01\"/>{asset}</asset><library_geometries><geometry id=\"g\"><mesh>\
+         <source id=\"p\"><float_array id=\"a\" count=\"24\">{}</float_array><technique_common>\
+         <accessor source=\"#a\" count=\"8\" stride=\"3\"/></technique_common></source>\
+         <vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>\
+         <triangles count=\"12\"><input semantic=\"VERTEX\" offset=\"0\" source=\"#v\"/><p>{faces}</p></triangles>\
+         </mesh></geometry></library_geometries></COLLADA>",
+        corners.join(" "),
+    )
+}
+
+#[test]
+fn in_a_urdf_collada_is_turned_to_z_up_only_if_asked_for() {
+    let package = Package::new("up-axis");
+    let size_of = |robot: &Robot, link: usize| {
+        let Shape::Mesh(mesh) = &robot.links[link].collisions[0].shape else {
+            panic!("no mesh");
+        };
+        let [low, high] = mesh.triangles.extent();
+        [0, 1, 2].map(|axis| ((high[axis] - low[axis]) * 1e9).round() / 1e9)
+    };
+    let axes = [
+        ("<up_axis>Y_UP</up_axis>", Some("Y_UP"), [0.1, 0.6, 0.2]),
+        ("<up_axis>X_UP</up_axis>", Some("X_UP"), [0.2, 0.6, 0.1]),
+        ("", Some("Y_UP"), [0.1, 0.6, 0.2]),
+        ("<up_axis>Z_UP</up_axis>", None, [0.1, 0.2, 0.6]),
+    ];
+    let mut links = String::new();
+    for (index, (axis, ..)) in axes.iter().enumerate() {
+        fs::write(package.root.join(format!("{index}.dae")), collada(axis)).unwrap();
+        links += &format!(
+            "<link name=\"l{index}\"><collision><geometry><mesh filename=\"{index}.dae\"/></geometry></collision></link>"
+        );
+        if index > 0 {
+            links += &format!(
+                "<joint name=\"j{index}\" type=\"fixed\"><parent link=\"l0\"/><child link=\"l{index}\"/></joint>"
+            );
+        }
+    }
+    let text = format!("<robot name=\"r\">{links}</robot>");
+    let read = |turned: bool| {
+        let mut options = UrdfOptions::default();
+        options.meshes.collada_up_axis |= turned;
+        Robot::from_urdf_text(&text, package.root.join("r.urdf"), options).unwrap()
+    };
+    let (plain, turned) = (read(false), read(true));
+    for (link, (axis, _, expected)) in axes.iter().enumerate() {
+        assert_eq!(size_of(&plain, link), [0.1, 0.2, 0.6], "{axis}");
+        assert_eq!(size_of(&turned, link), *expected, "{axis}");
+    }
+    let notes: Vec<_> = plain
+        .notes
+        .iter()
+        .filter(|note| note.contains("up_axis"))
+        .collect();
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert_says(
+        notes[0],
+        &[
+            "collada_up_axis",
+            "0.dae (Y_UP), 1.dae (X_UP), 2.dae (Y_UP)",
+        ],
+    );
+    assert!(!notes[0].contains("3.dae"), "{}", notes[0]);
+    assert!(
+        !turned
+            .notes
+            .iter()
+            .any(|note| note.contains("collada_up_axis"))
+    );
+}
+
+#[test]
 fn packages_are_found_above_the_file_and_in_package_dirs() {
     let package = Package::new("packages");
     let uri = "package://pkg/meshes/hand.stl";

@@ -33,7 +33,7 @@ impl Package {
     }
 
     fn visuals(&self, inside: &str) -> Visuals {
-        Robot::visuals(self.urdf(inside), &[]).unwrap()
+        Robot::visuals(self.urdf(inside), &UrdfOptions::default()).unwrap()
     }
 
     /// The visual of a robot that has one.
@@ -83,6 +83,7 @@ fn primitives_and_files_come_with_their_sizes() {
             "<mesh filename=\"package://pkg/meshes/hand.dae\" scale=\"1 -2 3\"/>",
             Look::File {
                 path: package.root.join("pkg/meshes/hand.dae"),
+                collada_up_axis: false,
                 scale: [1.0, -2.0, 3.0],
             },
         ),
@@ -90,6 +91,7 @@ fn primitives_and_files_come_with_their_sizes() {
             "<mesh filename=\"../meshes/hand.dae\"/>",
             Look::File {
                 path: package.root.join("pkg/urdf/../meshes/hand.dae"),
+                collada_up_axis: false,
                 scale: [1.0; 3],
             },
         ),
@@ -116,7 +118,9 @@ fn origins_are_those_of_collisions() {
             "<link name=\"l\"><visual>{inside}</visual><collision>{inside}</collision></link>"
         ));
         let robot = Robot::from_urdf(&path, UrdfOptions::default()).unwrap();
-        let visuals = Robot::visuals(&path, &[]).unwrap().visuals;
+        let visuals = Robot::visuals(&path, &UrdfOptions::default())
+            .unwrap()
+            .visuals;
         assert_eq!(
             visuals[0].pose, robot.links[0].collisions[0].pose,
             "{origin}"
@@ -202,7 +206,7 @@ fn what_cannot_be_shown_says_why_and_physics_takes_the_file() {
         ("<geometry><mesh/></geometry>", &["missing"]),
         (
             "<geometry><mesh filename=\"http://x/a.dae\"/></geometry>",
-            &["package://, file:// or a path"],
+            &["package://, model://, file:// or a path"],
         ),
         (
             "<geometry><mesh filename=\"../meshes/hand.dae\" scale=\"1 0 1\"/></geometry>",
@@ -217,7 +221,10 @@ fn what_cannot_be_shown_says_why_and_physics_takes_the_file() {
             "<link name=\"l\"><visual>{inside}</visual></link>"
         ));
         Robot::from_urdf(&path, UrdfOptions::default()).unwrap();
-        let visual = Robot::visuals(&path, &[]).unwrap().visuals.remove(0);
+        let visual = Robot::visuals(&path, &UrdfOptions::default())
+            .unwrap()
+            .visuals
+            .remove(0);
         let Look::Nothing { problem } = &visual.look else {
             panic!("{inside}: {visual:?}");
         };

@@ -1,7 +1,8 @@
-//! COLLADA: every geometry that the visual scene shows, where its nodes put it, in metres and turned to z up.
+//! COLLADA: every geometry that the visual scene shows, where its nodes put it, in metres.
 //!
-//! `<unit meter>` and `<up_axis>` are applied as the COLLADA 1.4.1 and 1.5 specifications have them (absent: 1 m, y up), as
-//! Bullet and Blender do; RViz leaves the axes as they are, so a turn is noted. Curves, lines and points are no surface and
+//! `<unit meter>` and, where it is asked for, `<up_axis>` are applied as the COLLADA 1.4.1 and 1.5 specifications have them
+//! (absent: 1 m, y up), as Blender does; a turn is noted. In a URDF file the axes stay as they are, as in RViz: exporters
+//! write `Y_UP` into files that are z up. Curves, lines and points are no surface and
 //! are passed over; skins are taken as they lie in the file. A geometry names its materials by symbols, which each instance
 //! binds.
 
@@ -16,6 +17,7 @@ use super::dae_material::Materials;
 use super::dae_mesh;
 use super::dae_xml::{ById, Named, numbers, referred};
 use super::scene::Affine;
+use super::text::text_of;
 use super::{Limits, RawMesh};
 
 /// Elements and texts of a file: coordinates are one text each, so real files have some thousands.
@@ -26,14 +28,13 @@ const DEPTH_MAX: usize = 100;
 const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_start_matches('\u{feff}');
+    let text = text_of(bytes)?;
     let options = ParsingOptions {
         allow_dtd: false,
         nodes_limit: NODES_MAX,
         ..ParsingOptions::default()
     };
-    let document = Document::parse_with_options(text, options)
+    let document = Document::parse_with_options(&text, options)
         .map_err(|error| format!("broken XML: {error}; export it again"))?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
@@ -102,7 +103,7 @@ struct Scene<'a, 'input> {
 }
 
 impl<'a, 'input> Scene<'a, 'input> {
-    /// From the file's units and axes to metres and z up.
+    /// From the file's units to metres, and from its axes to z up where that is wanted.
     fn frame(&mut self, root: Node) -> Result<Affine, String> {
         let asset = root.child("asset");
         let unit = asset.and_then(|asset| asset.child("unit"));
@@ -118,20 +119,25 @@ impl<'a, 'input> Scene<'a, 'input> {
         }
         let axis = asset.and_then(|asset| asset.child("up_axis"));
         let axis = axis.and_then(|axis| axis.text()).map_or("Y_UP", str::trim);
-        let turn = match axis {
-            "Z_UP" => return Ok(Affine::scaling([meter; 3])),
-            "Y_UP" => Affine::Y_UP,
-            "X_UP" => Affine::X_UP,
+        let metres = Affine::scaling([meter; 3]);
+        let (axis, turn) = match axis {
+            "Y_UP" => ("Y_UP", Affine::Y_UP),
+            "X_UP" => ("X_UP", Affine::X_UP),
+            other if other == "Z_UP" || !self.limits.collada_up_axis => return Ok(metres),
             other => {
                 return Err(format!(
                     "<up_axis> is `{other}`; it must be X_UP, Y_UP or Z_UP"
                 ));
             }
         };
+        if !self.limits.collada_up_axis {
+            self.mesh.ignored_up_axis = Some(axis);
+            return Ok(metres);
+        }
         self.mesh.notes.push(format!(
-            "is turned from {axis} to z up, as its file says; RViz leaves such files unturned"
+            "is turned from {axis} to z up, as its file says; in a URDF file it would not be"
         ));
-        Ok(turn.after(Affine::scaling([meter; 3])))
+        Ok(turn.after(metres))
     }
 
     fn children(

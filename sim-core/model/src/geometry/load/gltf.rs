@@ -14,6 +14,7 @@ use super::gltf_material::{self, Images};
 use super::gltf_rows::Buffers;
 use super::raw::{fan, separate, strip};
 use super::scene::Affine;
+use super::text::unmarked;
 use super::{Limits, RawMesh, Run};
 
 /// Deepest nesting of scene nodes.
@@ -22,7 +23,7 @@ const DEPTH_MAX: usize = 100;
 const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
-    let Gltf { document, blob } = Gltf::from_slice(bytes)
+    let Gltf { document, blob } = Gltf::from_slice(unmarked(bytes)?)
         .map_err(|error| format!("is not glTF 2.0: {error}; export it again"))?;
     if let Some(extension) = document.extensions_required().next() {
         return Err(format!(

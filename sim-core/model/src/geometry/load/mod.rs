@@ -4,7 +4,8 @@
 //! ([`super::visual`]).
 //!
 //! What comes from outside is checked: sizes before memory is taken, indices before they are followed, numbers for being
-//! finite. STL and OBJ say nothing of units and axes and are taken as they are; COLLADA and glTF say both.
+//! finite. STL and OBJ say nothing of units and axes and are taken as they are; COLLADA and glTF say both. COLLADA's up axis
+//! is applied where the reader of a file asks for it.
 
 mod color;
 mod dae;
@@ -19,6 +20,7 @@ mod obj;
 mod raw;
 mod scene;
 mod stl;
+mod text;
 
 use std::path::Path;
 
@@ -42,6 +44,8 @@ struct Limits {
     triangles: usize,
     /// Whether materials are read, too.
     looks: bool,
+    /// Whether COLLADA's `<up_axis>` is applied.
+    collada_up_axis: bool,
 }
 
 impl Limits {
@@ -77,28 +81,41 @@ enum Format {
     Gltf,
 }
 
-/// Reads the triangles of a file, vertices at the same place joined, with notes on what its author may not expect.
+/// Triangles of a file, vertices at the same place joined.
+pub(super) struct Loaded {
+    pub triangles: TriMesh,
+    /// What was done to it that its author may not expect.
+    pub notes: Vec<String>,
+    /// The axis that its file says is up, where that is not z and was not applied.
+    pub ignored_up_axis: Option<&'static str>,
+}
+
+/// Reads the triangles of a file.
 ///
 /// # Errors
 /// Why the file cannot be used, and the cure.
-pub(super) fn load(path: &Path) -> Result<(TriMesh, Vec<String>), String> {
-    let raw = read(path, false)?;
-    let mesh = TriMesh {
+pub(super) fn load(path: &Path, collada_up_axis: bool) -> Result<Loaded, String> {
+    let raw = read(path, false, collada_up_axis)?;
+    let triangles = TriMesh {
         vertices: raw.vertices,
         triangles: raw.triangles,
     }
     .joined();
-    if mesh.triangles.is_empty() {
+    if triangles.triangles.is_empty() {
         return Err(NO_AREA.to_owned());
     }
-    Ok((mesh, raw.notes))
+    Ok(Loaded {
+        triangles,
+        notes: raw.notes,
+        ignored_up_axis: raw.ignored_up_axis,
+    })
 }
 
 /// Reads a file as it is, with its materials if looks are wanted; coordinates are finite and indices in range.
 ///
 /// # Errors
 /// Why the file cannot be used, and the cure.
-pub(super) fn read(path: &Path, looks: bool) -> Result<RawMesh, String> {
+pub(super) fn read(path: &Path, looks: bool, collada_up_axis: bool) -> Result<RawMesh, String> {
     let format = format_of(path)?;
     let bytes = bytes_of(path, FILE_MAX)?;
     if bytes.is_empty() {
@@ -107,6 +124,7 @@ pub(super) fn read(path: &Path, looks: bool) -> Result<RawMesh, String> {
     let limits = Limits {
         triangles: TRIANGLES_MAX,
         looks,
+        collada_up_axis,
     };
     let folder = path.parent().unwrap_or(Path::new(""));
     let raw = match format {
@@ -157,10 +175,4 @@ fn bytes_of(path: &Path, most: u64) -> Result<Vec<u8>, String> {
         FileError::TooLarge { .. } => format!("{error}; simplify the mesh"),
         error => error.to_string(),
     })
-}
-
-/// Lines of a text, whether they end as on Unix, Windows or the old Macintosh.
-fn lines(text: &str) -> impl Iterator<Item = &str> {
-    let end = if text.contains('\n') { '\n' } else { '\r' };
-    text.split(end)
 }

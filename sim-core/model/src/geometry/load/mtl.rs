@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::super::visual::Image;
+use super::bytes_of;
 use super::color::color_of;
 use super::raw::{Material, Texture};
-use super::{bytes_of, lines};
+use super::text::{lines, text_of};
 
 /// Largest file of materials [bytes]: each is some lines.
 const MTL_MAX: u64 = 16 << 20;
@@ -28,7 +29,9 @@ pub(super) fn read(folder: &Path, name: &str) -> HashMap<String, Material> {
     let Ok(bytes) = bytes_of(&folder.join(name), MTL_MAX) else {
         return HashMap::new();
     };
-    let text = String::from_utf8_lossy(&bytes);
+    let Ok(text) = text_of(&bytes) else {
+        return HashMap::new();
+    };
     let mut entries: Vec<Entry> = Vec::new();
     for line in lines(&text) {
         let line = line.trim();

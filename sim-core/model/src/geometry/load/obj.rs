@@ -7,10 +7,11 @@ use std::path::Path;
 use super::color::{color_of, mean};
 use super::mtl;
 use super::raw::fan;
-use super::{Limits, Material, RawMesh, Run, lines};
+use super::text::{lines, text_of};
+use super::{Limits, Material, RawMesh, Run};
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = text_of(bytes)?;
     let mut mesh = RawMesh::default();
     let mut looks = limits.looks.then(|| Looks::new(folder));
     let (mut corners, mut places) = (Vec::new(), Vec::new());

@@ -16,6 +16,8 @@ pub(in super::super) struct RawMesh {
     pub runs: Vec<Run>,
     /// What was done to it that its author may not expect, a sentence each.
     pub notes: Vec<String>,
+    /// The axis that the file says is up, where that is not z and was not applied.
+    pub ignored_up_axis: Option<&'static str>,
 }
 
 /// Colour and image of a material.

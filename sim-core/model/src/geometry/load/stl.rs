@@ -2,7 +2,8 @@
 //!
 //! A binary file may begin with `solid` as a text does, so the length tells them apart: 84 bytes, then 50 a triangle.
 
-use super::{Limits, RawMesh, lines};
+use super::text::{is_wide, lines, text_of};
+use super::{Limits, RawMesh};
 
 /// Bytes before the first triangle of a binary file: a comment of 80, then the number of triangles.
 const HEADER: usize = 84;
@@ -15,7 +16,7 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
         .and_then(|count| count.try_into().ok())
         .map(|count| u32::from_le_bytes(count) as usize);
     let exact = claimed.is_some_and(|count| bytes.len() - HEADER == count.saturating_mul(RECORD));
-    if !exact && is_text(bytes) {
+    if !exact && (is_text(bytes) || is_wide(bytes)) {
         return read_text(bytes, limits);
     }
     let Some(claimed) = claimed else {
@@ -45,7 +46,8 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
 
 /// Whether it begins with the word `solid`, and is text where a binary file has numbers.
 fn is_text(bytes: &[u8]) -> bool {
-    let start = bytes.trim_ascii_start();
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let start = start.trim_ascii_start();
     let word = start
         .get(..5)
         .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
@@ -55,7 +57,7 @@ fn is_text(bytes: &[u8]) -> bool {
 
 /// Every `vertex x y z`; three make a triangle, whatever loops and facets are called around them.
 fn read_text(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = text_of(bytes)?;
     let mut mesh = RawMesh::default();
     let mut corners: Vec<[f64; 3]> = Vec::with_capacity(3);
     let mut ended = false;
