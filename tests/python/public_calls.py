@@ -53,6 +53,7 @@ CALLS: dict[str, Call] = {
             "strict": "flag",
             "mesh_max_hull_vertices": "count",
             "convex_decomposition": "flag",
+            "collada_up_axis": "flag",
             "package_dirs": "names",
         },
         path=URDF,
@@ -119,6 +120,7 @@ CALLS: dict[str, Call] = {
         },
     ),
     "Scene.save": of_scene("save", {"path": "new file"}),
+    "Scene.to_mujoco": of_scene("to_mujoco", {"path": "new file"}),
     "Scene.load": of_scene("load", {"path": "path"}),
     "Scene.from_toml": of_scene("from_toml", {"text": "toml", "folder": "text"}, text="dt = 0.001\nsubsteps = 1"),
     "Scene.from_mujoco": of_scene(

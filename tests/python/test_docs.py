@@ -65,10 +65,11 @@ def test_blocks_that_do_not_run_say_why():
         "needs a scene file of yours": 1,
         "needs an NVIDIA GPU": 1,
         "needs docker": 1,
+        "needs mujoco": 1,
         "needs mujoco and onnxruntime": 1,
         "needs onnxruntime": 2,
         "needs stable-baselines3": 1,
-        "needs torch, and minutes": 2,
+        "needs torch, and minutes": 3,
         "needs torchrun": 1,
     }
     assert len(found) - needs.total() >= 40

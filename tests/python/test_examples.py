@@ -59,7 +59,7 @@ importlib.util.find_spec = lambda name, package=None: None if name in missing el
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 # Modules of the others.
-PARTS = {"filming.py", "training.py", "training_log.py"}
+PARTS = {"filming.py", "training.py", "training_log.py", "training_watch.py"}
 
 
 @pytest.mark.parametrize("name", RUNS)
