@@ -144,8 +144,8 @@ class _Assembly:
         for robot, files in self._unturned.items():
             named = ", ".join([*files][:_LISTED_MAX]) + (", …" if len(files) > _LISTED_MAX else "")
             self._note(
-                f"robot `{robot}`: the <up_axis> of COLLADA files is not applied, as in RViz; if their parts lie wrong, "
-                f"set collada_up_axis: {named}"
+                f"robot `{robot}`: the <up_axis> of COLLADA files is not applied, as in RViz; if their parts lie "
+                f"wrong, set collada_up_axis: {named}"
             )
         dressed = {entry["robot"] for entry in visuals}
         made = []
