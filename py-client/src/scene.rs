@@ -9,6 +9,7 @@ use crate::errors::raise;
 
 /// Names, defaults and notes of a URDF file as JSON, arrays in dof order.
 #[pyfunction]
+#[expect(clippy::too_many_arguments)] // those of a file
 pub(crate) fn read_urdf(
     py: Python<'_>,
     path: PathBuf,
