@@ -38,7 +38,7 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test check check-format format docs test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test check check-format format docs pages test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -85,6 +85,9 @@ docs: announce-docs wheel $(VENV)/.docs ## the site into out/site: guides, refer
 	RUSTDOCFLAGS="-A warnings" cargo doc --release --workspace --no-deps --quiet
 	@rm -rf out/site/rust && cp -r target/doc out/site/rust
 	@echo "site: out/site/index.html"
+
+pages: wheel $(VENV)/.dev ## the parts of docs/pages that repeat what the code says, in place
+	cd docs && $(CURDIR)/$(PYTHON) -m generate.pages
 
 # Not part of `test`, which needs no torch. With several threads torch spins on busy cores.
 test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libraries, short trainings (installs 6 GB)

@@ -3,7 +3,8 @@
     python docs/sentence_length.py README.md docs/pages
 
 Prints the number of sentences, their mean and 95th percentile length in words, then every sentence of more than 25
-words. Code blocks, tables, headings, comments and API directives do not count. Inline code counts as one word.
+words. Code blocks, tables, headings, comments, API directives and generated parts do not count. Inline code counts as
+one word.
 ``tests/python/test_prose.py`` holds README.md and docs/pages to a limit.
 """
 
@@ -19,7 +20,7 @@ from pathlib import Path
 #: Words above which a sentence is printed.
 LONG = 25
 
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_COMMENT = re.compile(r"<!-- generated: .*?<!-- end -->|<!--.*?-->", re.DOTALL)
 _FENCE = re.compile(r"^ *(```|~~~)")
 # Headings, tables, link targets, and mkdocstrings directives with their options.
 _SKIPPED = re.compile(r"^ *(#|\||\[[^\]]+\]: |::: )|^ {4,}\w+:( |$)")

@@ -1,1 +1,1 @@
-"""Pages of the site that repeat what the code says: generated at each build, so that none can go stale."""
+"""Parts of the pages that repeat what the code says: generated, so that none can go stale."""

@@ -1,7 +1,10 @@
-"""Pages whose tables repeat what the code says: the prose is in docs/pages, the tables are generated at each build.
+"""Pages whose tables repeat what the code says: what stands between the two marks is generated.
 
-A page has ``<!-- generated: NAME -->`` where a part of its module belongs. What stands between ``<!-- forge -->`` and
-``<!-- end -->`` is for readers of the repository, and not on the site.
+    make pages      # or, in docs: python -m generate.pages
+
+writes it anew. A page has ``<!-- generated: NAME -->`` before a part of its module, and ``<!-- end -->`` after it. A
+test compares the repository's pages with the code. The site's are filled at each build. What stands between
+``<!-- forge -->`` and ``<!-- end -->`` is for readers of the repository, and not on the site.
 """
 
 from __future__ import annotations
@@ -25,12 +28,12 @@ PARTS: dict[str, Callable[[], dict[str, str]]] = {
 }
 
 _FORGE = re.compile(r"<!-- forge -->.*?<!-- end -->\n*", re.DOTALL)
-_PLACE = re.compile(r"<!-- generated: (\w+) -->")
+_PART = re.compile(r"<!-- generated: (\w+) -->\n(.*?)<!-- end -->\n", re.DOTALL)
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(((?:\.\./)+[^)]+)\)")
 
 
 def page(name: str) -> str:
-    """A page with its generated parts.
+    """A page as the site has it.
 
     Raises:
         LookupError: The page lacks the place of a part, or has one that no part is for.
@@ -39,13 +42,22 @@ def page(name: str) -> str:
 
 
 def fill(name: str, text: str) -> str:
-    """A page's text as the site has it; pages without generated parts lose what is for a forge."""
-    text = _FORGE.sub("", text)
+    """A page's text as the site has it: with its generated parts, without marks and what is for a forge."""
+    return _PART.sub(lambda part: part[2].strip() + "\n", write(name, _FORGE.sub("", text)))
+
+
+def write(name: str, text: str) -> str:
+    """A page's text with its generated parts between their marks, as the repository has it."""
     parts = PARTS[name]() if name in PARTS else {}
-    places = set(_PLACE.findall(text))
+    places = {part[1] for part in _PART.finditer(text)}
     if places != set(parts):
         raise LookupError(f"docs/pages/{name} has places for {sorted(places)}; give it those for {sorted(parts)}")
-    return _PLACE.sub(lambda place: parts[place.group(1)].rstrip(), text)
+    return _PART.sub(lambda part: f"<!-- generated: {part[1]} -->\n\n{parts[part[1]].strip()}\n\n<!-- end -->\n", text)
+
+
+def handwritten(text: str) -> str:
+    """A page's text without its generated parts."""
+    return _PART.sub("", text)
 
 
 def inside(name: str, text: str) -> str:
@@ -75,3 +87,8 @@ def _leaves(name: str, target: str) -> Path | None:
     """The file that a link of a page leads to; None if it is in docs/pages."""
     file = Path(os.path.normpath((DOCS / name).parent / target.partition("#")[0]))
     return None if file.is_relative_to(DOCS) else file
+
+
+if __name__ == "__main__":
+    for name in PARTS:
+        (DOCS / name).write_text(write(name, (DOCS / name).read_text()))

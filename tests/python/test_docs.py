@@ -45,6 +45,18 @@ def test_every_block_of_a_generated_page_runs(name, tmp_path):
             reader.run(block)
 
 
+@pytest.mark.parametrize("name", pages.PARTS)
+def test_the_generated_parts_of_a_page_are_those_of_the_code(name):
+    text = (PAGES / name).read_text()
+    assert pages.write(name, text) == text, "`make pages` writes them anew"
+    assert len(text) > 1.5 * len(pages.handwritten(text))
+
+
+def test_a_page_without_the_place_of_a_part_is_refused():
+    with pytest.raises(LookupError, match=r"fields\.md has places for .*; give it those for .*parameters"):
+        pages.write("fields.md", "# Fields\n<!-- generated: fields -->\n<!-- end -->\n")
+
+
 def test_blocks_that_do_not_run_say_why():
     texts = {path.name: path.read_text() for path in [*WRITTEN, REPOSITORY / "README.md"]}
     found = [block for name, text in texts.items() for block in blocks(name, text)]
