@@ -219,6 +219,27 @@ def test_a_closed_or_forgotten_environment_leaves_no_process(spread: Any) -> Non
         assert wait_until(lambda pids=pids: not any(map(alive, pids)), 15), end
 
 
+def test_after_a_shutdown_of_ray_no_call_starts_another_cluster(cluster: Any, nodes: Any) -> None:
+    nodes(1)
+    env = RayVectorEnv("CartPoleBalance", 2, actors=1)
+    env.reset(seed=0)
+    actions = np.zeros((2, 1), np.float32)
+    env.send(actions)
+    ray.shutdown()
+    try:
+        for call in (env.recv, env.reset, lambda: env.elapsed):
+            with pytest.raises(tl.SimClosed, match="Ray was shut down, and the actors with it; close this environment"):
+                call()
+            assert not ray.is_initialized()
+    finally:
+        ray.init(address=cluster.address, log_to_driver=False)
+    # another connection has other actors
+    with pytest.raises(tl.SimClosed, match="Ray was shut down"):
+        env.reset()
+    env.close()
+    RayVectorEnv("CartPoleBalance", 2, actors=1).close()
+
+
 def test_one_actor_per_node_is_the_default(spread: Any, nodes: Any) -> None:
     nodes(3)
     env = spread("CartPoleBalance", 8, actors=None)

@@ -25,7 +25,7 @@ from tightloop.adapters.shards import Lost
 from tightloop.adapters.spread import SpreadVectorEnv
 from tightloop.env.results import OnNan
 from tightloop.env.task import Task
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, SimClosed
 from tightloop.signatures import checked_calls
 
 ray = library("ray", install="ray")
@@ -103,6 +103,8 @@ class RayVectorEnv(SpreadVectorEnv):
         Raises:
             ArgumentError: An argument is not valid; the message names it.
             LaunchError: An actor could not start in time. Other errors are those of `VectorEnv`.
+
+        After a shutdown of Ray every call but `close` raises `SimClosed`.
         """
         for name, why in _REFUSED.items():
             if name in options:
@@ -143,14 +145,17 @@ class _Actors:
         self.needs = f"{ {name: amount for name, amount in needs.items() if amount} }"
         # a call is never repeated: its worlds have moved on, or are lost
         self._kind = ray.remote(_NodeShard).options(**options, max_restarts=0, max_task_retries=0)
+        self._session = ray.get_runtime_context().get_worker_id()  # of this connection to a cluster
         self._actors: list[Any] = [None] * count
         self._largest = [0] * count  # answer of each shard [bytes]
 
     def start(self, shard: int) -> None:
+        self._check_connected()
         self.stop(shard)
         self._actors[shard] = self._kind.remote()
 
     def call(self, shard: int, method: str, *arguments: Any) -> Any:
+        self._check_connected()
         actor, sent = self._actors[shard], ray.cloudpickle.dumps(arguments)
         if actor is None:
             return Lost("it did not start")
@@ -160,6 +165,7 @@ class _Actors:
         return shard, [parts] if count == 1 else parts
 
     def answers(self, calls: Sequence[Any], timeout: float) -> list[Any]:
+        self._check_connected()
         parts = [part for call in calls if not isinstance(call, Lost) for part in call[1]]
         ready = set(ray.wait(parts, num_returns=len(parts), timeout=timeout)[0]) if parts else set()
         late = Lost(f"it did not answer within {timeout:.3g} s")
@@ -188,13 +194,21 @@ class _Actors:
 
     def close(self) -> None:
         # Ray has ended the actors, if it was shut down before the environment
-        if not ray.is_initialized():
+        if not self._is_connected():
             return
         closing = [actor.close.remote() for actor in self._actors if actor is not None]
         if closing:
             ray.wait(closing, num_returns=len(closing), timeout=_CLOSE_SECONDS)
         for shard in range(len(self._actors)):
             self.stop(shard)
+
+    def _is_connected(self) -> bool:
+        return ray.is_initialized() and ray.get_runtime_context().get_worker_id() == self._session
+
+    def _check_connected(self) -> None:
+        """Refuse calls after a shutdown of Ray: its functions would silently start another cluster."""
+        if not self._is_connected():
+            raise SimClosed("Ray was shut down, and the actors with it; close this environment, and make another one")
 
 
 class _NodeShard(Shard):
