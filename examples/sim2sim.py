@@ -4,7 +4,7 @@
     python examples/sim2sim.py out/ppo/QuadrupedVelocityFlat-0/policy.onnx
 
 The ONNX file's metadata says what the policy sees and what its actions mean. MuJoCo's model is written from the task's
-scene by `Scene.to_mujoco`, so any robot that the task takes runs there. The side of tightloop is the task itself.
+scene by `Scene.to_mujoco`; a robot from MJCF stands on MuJoCo's plane. The side of tightloop is the task itself.
 
 First both simulators play the same actions from the same state, open loop. The distances of their joints and
 observations are printed. Then the policy drives each robot for 10 s per command, closed loop, and the error of its
@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 from training import needed
 
 import tightloop as tl
-from tightloop.env import Task, Worlds
+from tightloop.env import Worlds
 from tightloop.env.names import Names
 from tightloop.env.registry import make_task
+from tightloop.tasks.legged import LeggedModel, LeggedRobot
+from tightloop.tasks.velocity import VelocityTask
 
 with needed("mujoco", "onnxruntime"):
     import mujoco
@@ -50,7 +52,7 @@ class Facts:
         if "task" in self._metadata:
             raise SystemExit(
                 f"{self._path} is a policy of {self._metadata['task']} without metadata {name!r}; only policies of "
-                "velocity tasks run here, with robots from URDF"
+                "velocity tasks run here"
             )
         raise SystemExit(f"{self._path} has no metadata {name!r}; examples/policy_file.py writes that of its task")
 
@@ -78,12 +80,10 @@ class Player:
     obs: NDArray[np.float32]
     joints: NDArray[np.float64]
 
-    def __init__(self, facts: Facts) -> None:
-        if {*facts.names("action_types")} != {"JointTarget"}:
-            raise SystemExit(f"the policy's actions are {facts.names('action_types')[0]}; this takes JointTarget only")
+    def __init__(self, facts: Facts, robot: LeggedRobot) -> None:
         self.names = facts.names("joint_names")
         # the task observes these alone; drives hold the others
-        self._driven = [self.names.index(name) for name in facts.names("action_names")]
+        self._driven = [self.names.index(name) for name in robot.joints]
         self._scale, self._offset = facts.numbers("action_scale"), facts.numbers("action_offset")
         self._low, self._high = facts.numbers("action_low"), facts.numbers("action_high")
         self._targets = facts.numbers("default_joint_pos")
@@ -119,12 +119,13 @@ class Player:
 class InMujoco(Player):
     """In MuJoCo C, from the scene as MJCF, seen as the metadata says."""
 
-    def __init__(self, facts: Facts, scene: tl.Scene) -> None:
-        super().__init__(facts)
-        self.model = mujoco.MjModel.from_xml_string(scene.to_mujoco())
+    def __init__(self, facts: Facts, robot: LeggedRobot, scene: tl.Scene) -> None:
+        super().__init__(facts, robot)
+        # what MuJoCo compiled stays as it is
+        is_own = isinstance(robot, LeggedModel)
+        self.model = robot.on_ground() if is_own else mujoco.MjModel.from_xml_string(scene.to_mujoco())
         self.data = mujoco.MjData(self.model)
-        (robot,) = scene.robots
-        own = [self.model.joint(f"{robot}/{name}").id for name in self.names]
+        own = [self.model.joint(name if is_own else f"{robot.name}/{name}").id for name in self.names]
         self._coords, self._dofs = self.model.jnt_qposadr[own], self.model.jnt_dofadr[own]
         # a joint without gains has no actuator
         self._actuators = [list(own).index(joint) for joint in self.model.actuator_trnid[:, 0]]
@@ -135,7 +136,9 @@ class InMujoco(Player):
         if set(facts.numbers("observation_history")) != {1}:
             raise SystemExit("the policy sees steps before; this shows it the current one only")
         self._turn = 2 * np.pi * facts.number("gait_hz") * facts.number("control_dt") if "phase" in self._parts else 0.0
-        self._range = np.where(self.model.jnt_limited[own], self.model.jnt_range[own].T, [[-np.inf], [np.inf]])
+        # tightloop clips targets of drives to the joint's range, and leaves MuJoCo's controls to the actuator
+        is_clipped = self.model.jnt_limited[own] & (not is_own)
+        self._range = np.where(is_clipped, self.model.jnt_range[own].T, [[-np.inf], [np.inf]])
         self._substeps, self._phase = int(facts.number("substeps")), 0.0
 
     def _start(self, joint_q: NDArray[np.float64]) -> None:
@@ -177,14 +180,15 @@ class InMujoco(Player):
 class InTightloop(Player):
     """In tightloop, in a daemon with one world, seen by the task's own functions."""
 
-    def __init__(self, facts: Facts, task: Task, sim: tl.Sim) -> None:
-        super().__init__(facts)
+    def __init__(self, facts: Facts, task: VelocityTask, sim: tl.Sim) -> None:
+        super().__init__(facts, task.robot)
         self.task, self.sim, self._memory = task, sim, None
         names = Names(sim.info)
         task.bind(names)
-        ((self._robot, robot),) = task.scene().robots.items()
+        self._robot, self._is_own = task.robot.name, isinstance(task.robot, LeggedModel)
         self._coords = [names.coord(f"{self._robot}/{name}") for name in self.names]
-        self._range = np.asarray(robot.joint_range)[-len(self.names) :].T
+        if not self._is_own:
+            self._range = np.asarray(task.scene().robots[self._robot].joint_range)[-len(self.names) :].T
 
     def _start(self, joint_q: NDArray[np.float64]) -> None:
         self.sim.reset()
@@ -192,7 +196,10 @@ class InTightloop(Player):
         self._observe(self.sim.write(joint_q=joint_q, joint_qd=np.zeros(len(self.sim.info["dof_names"]))))
 
     def _step(self, targets: NDArray[np.float64]) -> None:
-        self._observe(self.sim.step(joint_target_q={self._robot: np.clip(targets, *self._range)}))
+        if self._is_own:
+            self._observe(self.sim.step(ctrl=targets[self._driven]))
+        else:
+            self._observe(self.sim.step(joint_target_q={self._robot: np.clip(targets, *self._range)}))
 
     def _observe(self, frame: Any) -> None:
         self.joints = np.array(frame.joint_q[0, self._coords], np.float64)
@@ -207,7 +214,7 @@ def main() -> None:
     """Read the policy and compare."""
     parser = argparse.ArgumentParser(description="Run a walking policy in MuJoCo C.")
     parser.add_argument("policy", type=Path, help="ONNX file with metadata, of a task that follows velocities")
-    parser.add_argument("--robot", type=Path, help="URDF file (default: that of the policy's task)")
+    parser.add_argument("--robot", type=Path, help="URDF or MJCF file (default: that of the policy's task)")
     args = parser.parse_args()
     if not args.policy.is_file():
         raise SystemExit(f"there is no policy {args.policy}; name an ONNX file, such as those in examples/trained")
@@ -221,7 +228,7 @@ def main() -> None:
     if args.robot:
         options["model"] = str(args.robot)
     if "model" in options and not Path(options["model"]).is_file():
-        raise SystemExit(f"there is no robot {options['model']}; name its URDF file by --robot")
+        raise SystemExit(f"there is no robot {options['model']}; name its file by --robot")
     try:
         compare(session, facts, options)
     except tl.TightloopError as error:
@@ -236,10 +243,14 @@ def compare(session: onnxruntime.InferenceSession, facts: Facts, options: dict[s
         return np.asarray(session.run(None, {session.get_inputs()[0].name: obs})[0])
 
     task = make_task(facts.names("task")[0], options)
+    if not isinstance(task, VelocityTask):
+        raise SystemExit(f"the policy is one of {type(task).__name__}; only those of velocity tasks run here")
     scene = task.scene()
     with tl.launch(scene, worlds=1, precision="f64", fields=task.fields) as sim:
         start = np.array(sim.reset().joint_q[0], np.float64)
-        ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, scene)
+        if isinstance(task.robot, LeggedModel):
+            start = task.robot.start_q  # the scene begins where the file does
+        ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, task.robot, scene)
         ours.begin(start, commands[1]), theirs.begin(start, commands[1])
         for step in range(1, OPEN_LOOP + 1):
             action = policy(ours.obs)

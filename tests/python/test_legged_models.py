@@ -264,3 +264,36 @@ def test_an_environment_takes_a_model_by_name(envs: Any) -> None:
     assert envs("QuadrupedVelocityFlat", 2, model=str(ANT)).single_action_space.shape == (8,)
     with pytest.raises(tl.SignatureError, match="model"):
         VectorEnv("QuadrupedVelocityFlat", 2, modell=str(ANT))
+
+
+@pytest.mark.parametrize("kind", ["MJCF", "ant"])
+def test_mujoco_moves_a_robot_from_mjcf_on_its_plane_as_tightloop_does(kind: str, tmp_path: Path) -> None:
+    task = QuadrupedVelocityFlat(model=file_of(tmp_path) if kind == "MJCF" else ANT)
+    theirs = task.robot.on_ground()
+    data, rng = mujoco.MjData(theirs), np.random.default_rng(0)
+    touched = 0
+    with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
+        start = task.robot.start_q
+        frame = sim.write(joint_q=start, joint_qd=np.zeros(theirs.nv))
+        data.qpos[:] = start[[0, 1, 2, 6, 3, 4, 5, *range(7, len(start))]]
+        for _ in range(40):
+            controls = task.robot.standing + rng.uniform(-0.3, 0.3, theirs.nu)
+            frame, data.ctrl[:] = sim.step(ctrl=controls), controls
+            mujoco.mj_step(theirs, data, 4)
+            touched = max(touched, data.ncon)
+            np.testing.assert_allclose(frame.joint_q[0, 7:], data.qpos[7:], atol=1e-9)
+            np.testing.assert_allclose(frame.joint_q[0, :3], data.qpos[:3], atol=1e-9)
+    assert touched >= 3
+
+
+@pytest.mark.parametrize(("calf", "is_kept"), [(-1.4, True), (-0.3, False)])
+def test_a_keyframe_beyond_the_limits_of_joints_is_no_pose_to_stand_in(
+    calf: float, is_kept: bool, tmp_path: Path
+) -> None:
+    file = file_of(tmp_path)
+    text = file.read_text()
+    assert text.count("0.7 -1.4") == 4
+    file.write_text(text.replace("0.7 -1.4", f"0.2 {calf}"))  # calves turn from -2.7 to -0.9 rad
+    robot = QuadrupedVelocityFlat(model=file).robot
+    assert (robot.standing[2] == pytest.approx(calf)) is is_kept
+    assert all(-2.7 <= angle <= -0.9 for angle in robot.standing[2::3])

@@ -78,16 +78,23 @@ ARM = """
 </robot>"""
 
 
-def test_mujoco_shows_the_joints_of_the_action_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["urdf", "xml"])
+def test_mujoco_shows_the_joints_of_the_action_alone(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "dog.urdf"
     file.write_text(assets.QUADRUPED.read_text().replace("</robot>", ARM))
+    if kind == "xml":
+        robot = tl.Scene()
+        robot.add_ground()
+        robot.add_urdf(file, name="dog", floating=True)
+        file = tmp_path / "dog.xml"
+        file.write_text(robot.to_mujoco())
     envs = VectorEnv("QuadrupedVelocityFlat", 1, model=file)
     facts, task = Facts(tmp_path / "policy.onnx", policy_metadata(envs)), QuadrupedVelocityFlat(model=file)
     envs.close()
     assert len(facts.names("joint_names")) == 14
     with tl.launch(task.scene(), worlds=1, precision="f64", fields=task.fields) as sim:
-        start = np.array(sim.reset().joint_q[0], np.float64)
-        players = InTightloop(facts, task, sim), InMujoco(facts, task.scene())
+        start = np.array(sim.reset().joint_q[0], np.float64) if kind == "urdf" else task.robot.start_q
+        players = InTightloop(facts, task, sim), InMujoco(facts, task.robot, task.scene())
         for player in players:
             player.begin(start, COMMANDS[0])
             for _ in range(5):

@@ -196,6 +196,17 @@ class LeggedModel(LeggedRobot):
         joint_q[:, 5], joint_q[:, 6] = np.sin(half), np.cos(half)
         return joint_q
 
+    def on_ground(self) -> Any:
+        """Return an `mujoco.MjModel` of it on a plane, to run its policies in MuJoCo.
+
+        Raises:
+            ArgumentError: It has equalities, tendons or plugins.
+        """
+        # needs MuJoCo, which URDF robots do not
+        from tightloop.tasks.legged_models.grounded import grounded
+
+        return grounded(self.model)
+
     def metadata(self) -> dict[str, Any]:
         """Return its joints with one coordinate, the pose in which it stands, and their drives or springs."""
         model, single = self.model, [joint for joint in range(self.model.njnt) if self.model.jnt_type[joint] >= _SLIDE]

@@ -19,6 +19,8 @@ _NEUTRAL = 3e-3
 _SOLE = 0.01
 #: A pose that stands has feet at one height, up to this share of the reach [–].
 _LEVEL = 0.1
+#: Joints of a file's pose may be this far beyond their limits, as rounded numbers are [rad].
+_BEYOND = 0.01
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,9 @@ def _least_squares(misses: Callable[[Array], Array], poses: Array, low: Array, h
 
 
 def stands(skeleton: Skeleton, legs: Sequence[Leg], q: Array) -> bool:
-    """Return whether all legs end at one height, below everything else, and in the lower half of their reach."""
+    """Return whether all legs end at one height, below all else, in the lower half of their reach, within limits."""
+    if ((q < skeleton.low - _BEYOND) | (q > skeleton.high + _BEYOND)).any():
+        return False
     frames = skeleton.frames(q[None])
     feet = np.array([skeleton.lowest(skeleton.moves[leg.joints[-1]], frames)[0] for leg in legs])
     reach = min(leg.reach for leg in legs)
