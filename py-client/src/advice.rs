@@ -6,15 +6,15 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use pyo3::prelude::*;
-use sim_protocol::{Command, Description, Values};
+use sim_protocol::{Command, Description};
 
+use crate::followers::Followers;
 use crate::frame::PyFrame;
 use crate::not_finite::NotFinite;
+use crate::rows::{first, number, worlds};
 
 /// Calls whose arrays are looked at: a wrong unit or order is there from the first ones on.
 const CALLS: u32 = 256;
-/// Worlds of an array that are looked at: such a mistake is in all of them, and thousands would cost microseconds.
-const WORLDS: usize = 16;
 /// Bits of `status` of a faulted world: no longer finite, or beyond the bounds.
 const FAULTED: u32 = 1 | 8;
 /// How far outside of its limits a joint's target looks like degrees [rad]: policies that learn overshoot by less.
@@ -36,6 +36,7 @@ enum Told {
     Faults = 16,
     Gravity = 32,
     Limits = 64,
+    Followers = 128,
 }
 
 /// What is looked at, and what was told already.
@@ -49,6 +50,7 @@ pub(crate) struct Advice {
     /// Commands that are not finite are looked for, since they fault their world alone.
     spoils: bool,
     spoiled: NotFinite,
+    followers: Followers,
     /// Positions of each dof and of each coordinate that look like degrees are outside of these [rad].
     dofs: Vec<[f64; 2]>,
     coords: Vec<[f64; 2]>,
@@ -81,6 +83,7 @@ impl Advice {
             turned: AtomicBool::new(false),
             spoils: description.on_nan == "freeze",
             spoiled: NotFinite::default(),
+            followers: Followers::new(description),
             coords: names.iter().map(of_coord).collect(),
             quaternions: (0..names.len())
                 .filter(|&at| names[at].ends_with(".qx"))
@@ -124,7 +127,8 @@ impl Advice {
         for of in commands {
             match of.field {
                 "joint_target_q" => {
-                    self.degrees(py, of, &self.dofs, &description.dof_names, None)?
+                    self.degrees(py, of, &self.dofs, &description.dof_names, None)?;
+                    self.followers(py, of, None, description)?;
                 }
                 "mocap_quat" => self.mocaps(py, of, description, None)?,
                 "joint_f" if !self.aims.load(Ordering::Relaxed) => {
@@ -153,6 +157,7 @@ impl Advice {
                     let names = &description.coord_names;
                     self.degrees(py, of, &self.coords, names, mask)?;
                     self.limits(py, of, names, mask)?;
+                    self.followers(py, of, mask, description)?;
                     let first = of.columns.start;
                     let is_whole = |at: &&usize| **at >= first && **at + 4 <= of.columns.end;
                     for at in self
@@ -238,6 +243,20 @@ impl Advice {
     /// Whether something was not told before; then it is now.
     fn is_new(&self, what: Told) -> bool {
         self.told.fetch_or(what as u8, Ordering::Relaxed) & what as u8 == 0
+    }
+
+    /// Warns of mimic joints that are elsewhere than their leaders put them.
+    fn followers(
+        &self,
+        py: Python<'_>,
+        of: &Command<'_>,
+        mask: Option<&[bool]>,
+        description: &Description,
+    ) -> PyResult<()> {
+        match self.followers.problem(of, mask, description) {
+            Some(problem) if self.is_new(Told::Followers) => warn(py, &problem),
+            _ => Ok(()),
+        }
     }
 
     /// Warns of positions that look like degrees.
@@ -456,35 +475,6 @@ fn of_order(what: &str, world: usize, order: &str, place: usize) -> String {
         text(given),
         text(meant)
     )
-}
-
-/// The first worlds of an array that it is for.
-fn worlds<'a>(of: &Command<'_>, mask: Option<&'a [bool]>) -> impl Iterator<Item = usize> + 'a {
-    let rows = of.values.len() / of.columns.len().max(1);
-    (0..rows)
-        .filter(move |&world| mask.is_none_or(|mask| mask[world]))
-        .take(WORLDS)
-}
-
-/// The first value that is wrong, of its first worlds: world, column and value.
-fn first(
-    of: &Command<'_>,
-    mask: Option<&[bool]>,
-    is_wrong: impl Fn(usize, f64) -> bool,
-) -> Option<(usize, usize, f64)> {
-    let width = of.columns.len();
-    worlds(of, mask).find_map(|world| {
-        let mut values = (0..width).map(|at| (at, number(&of.values, world * width + at)));
-        let (at, value) = values.find(|&(at, value)| is_wrong(at, value))?;
-        Some((world, at, value))
-    })
-}
-
-fn number(values: &Values<'_>, at: usize) -> f64 {
-    match values {
-        Values::F32(values) => f64::from(values[at]),
-        Values::F64(values) => values[at],
-    }
 }
 
 #[cold]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping};
+use pyo3::types::{PyDict, PyList, PyMapping};
 use sim_protocol::{Command, Description, RobotRange, Values};
 
 use crate::errors::raise;
@@ -77,7 +77,8 @@ impl<'a, 'py> Inputs<'a, 'py> {
         }
     }
 
-    /// Takes a parameter, a part of the state or a command of every world that needs no conversion.
+    /// Takes a parameter, a part of the state or a command of every world that needs no conversion: all columns, or a list
+    /// of runs of them, first column and array.
     pub(crate) fn add_ready(&mut self, name: &str, value: &Bound<'py, PyAny>) -> PyResult<()> {
         let params = self.description.params.iter().map(|param| &param.info);
         let known = params
@@ -86,6 +87,9 @@ impl<'a, 'py> Inputs<'a, 'py> {
             .find(|info| info.name == name);
         let refused = |reason: String| raise(value.py(), "CommandRefused", reason);
         let info = known.ok_or_else(|| refused(format!("this scene has no `{name}`")))?;
+        if let Ok(runs) = value.cast::<PyList>() {
+            return self.add_runs(&info.name, runs.as_any());
+        }
         let array = value.cast::<PyArrayDyn<f64>>()?;
         if !array.is_c_contiguous() {
             return Err(refused(format!("{name}: its rows are not contiguous")));
@@ -95,6 +99,20 @@ impl<'a, 'py> Inputs<'a, 'py> {
             columns: 0..info.columns,
             array: Array::F64(array.try_readonly()?),
         });
+        Ok(())
+    }
+
+    /// Takes runs of columns: the first column of each, and its array, contiguous in float64.
+    fn add_runs(&mut self, field: &'a str, runs: &Bound<'py, PyAny>) -> PyResult<()> {
+        for run in runs.try_iter()? {
+            let (first, array): (usize, Bound<'py, PyAny>) = run?.extract()?;
+            let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
+            self.arrays.push(Input {
+                field,
+                columns: first..first + array.shape()[1],
+                array: Array::F64(array),
+            });
+        }
         Ok(())
     }
 
@@ -163,22 +181,22 @@ impl<'a, 'py> Inputs<'a, 'py> {
                 (robot.name.as_str(), columns.start, columns.end, base)
             })
             .collect();
+        let followers = self.description.followers.iter();
+        let followers: Vec<(&str, &str, f64, f64)> = followers
+            .map(|own| {
+                let names = (own.name.as_str(), own.leader.as_str());
+                (names.0, names.1, own.multiplier, own.offset)
+            })
+            .collect();
+        let more = PyDict::new(given.py());
+        more.set_item("followers", followers)?;
         let (names, worlds) = (axis.names(self.description), self.description.worlds);
         let parts = given
             .py()
             .import("tightloop.named_columns")?
             .getattr("named_columns")?
-            .call1((field, given, worlds, names, robots))?;
-        for part in parts.try_iter()? {
-            let (first, array): (usize, Bound<'py, PyAny>) = part?.extract()?;
-            let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
-            self.arrays.push(Input {
-                field,
-                columns: first..first + array.shape()[1],
-                array: Array::F64(array),
-            });
-        }
-        Ok(())
+            .call((field, given, worlds, names, robots), Some(&more))?;
+        self.add_runs(field, &parts)
     }
 
     fn add_robot(

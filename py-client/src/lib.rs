@@ -8,6 +8,7 @@ mod arrays;
 mod client;
 mod dynamics;
 mod errors;
+mod followers;
 mod frame;
 mod ik;
 mod input;
@@ -17,6 +18,7 @@ mod parts;
 mod picture;
 mod random;
 mod rays;
+mod rows;
 mod scene;
 
 use std::ffi::OsString;

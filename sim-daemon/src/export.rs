@@ -5,6 +5,7 @@ use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description as Scene, JointKind, KeyState, Model};
 use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
+use sim_physics::constants::Equality;
 use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
 use sim_protocol::{
@@ -157,6 +158,17 @@ pub(crate) fn description(
                 actuators: [robot.actuators.start, robot.actuators.end],
             })
             .collect(),
+        followers: {
+            let names = model.dof_names();
+            let mimics = model.constants().equalities.iter();
+            let follower = |mimic: &Equality<f64>| protocol::Follower {
+                name: names[mimic.follower].clone(),
+                leader: names[mimic.leader].clone(),
+                multiplier: mimic.multiplier,
+                offset: mimic.offset,
+            };
+            mimics.map(follower).collect()
+        },
         fields: layout
             .slots
             .iter()

@@ -15,12 +15,22 @@ from tightloop.inputs import as_array, real_numbers
 
 #: Name, first column, end, and columns of a floating base.
 Place = tuple[str, int, int, int]
+#: A mimic joint, its leader, and multiplier and offset of its position.
+Follower = tuple[str, str, float, float]
+#: What followers take from their leaders, and whether the offset belongs to it: forces they do not.
+_FOLLOWED = {"joint_q": True, "joint_qd": False, "joint_target_q": True, "joint_target_qd": False}
 #: Parts of a quaternion, which are only given together.
 _QUATERNION = (".qx", ".qy", ".qz", ".qw")
 
 
 def named_columns(
-    field: str, given: Mapping[Any, Any], worlds: int, names: Sequence[str], robots: Sequence[Place]
+    field: str,
+    given: Mapping[Any, Any],
+    worlds: int,
+    names: Sequence[str],
+    robots: Sequence[Place],
+    *,
+    followers: Sequence[Follower] = (),
 ) -> list[tuple[int, NDArray[np.float64]]]:
     """Return the columns that a dict gives, as runs of neighbours: first column, and array ``(worlds, columns)``.
 
@@ -28,12 +38,16 @@ def named_columns(
     value of a robot may be a dict by the names within it. A full name counts before a pattern, and a pattern before
     the array of a whole robot.
 
+    A mimic joint follows its leader where the dict gives the leader, and not the mimic joint by a key that counts as
+    much. A pattern that matches both gives the leader.
+
     Args:
         field: Name of the argument, for messages.
         given: The dict.
         worlds: Number of worlds.
         names: Names of all columns.
         robots: The robots.
+        followers: The mimic joints.
 
     Raises:
         CommandRefused: A key means nothing, or a column has two values; or a shape or dtype is wrong.
@@ -77,7 +91,24 @@ def named_columns(
             for column, place in enumerate(range(stop - array.shape[1], stop)):
                 put(0, key, place, array[:, column])
     _check_quaternions(field, columns.keys(), names)
+    if field in _FOLLOWED:
+        _follow(columns, places, followers, has_offsets=_FOLLOWED[field])
     return _runs(columns)
+
+
+def _follow(
+    columns: dict[int, tuple[int, Any, NDArray[Any]]],
+    places: Mapping[str, int],
+    followers: Sequence[Follower],
+    *,
+    has_offsets: bool,
+) -> None:
+    """Add the columns of mimic joints whose leader counts more; a pattern that matches both gives the leader."""
+    for name, leader, multiplier, offset in followers:
+        own, lead = columns.get(places[name]), columns.get(places[leader])
+        if lead is not None and (own is None or own[0] < lead[0] or (own[0] == 1 and own[:2] == lead[:2])):
+            rank, key, values = lead
+            columns[places[name]] = rank, key, multiplier * values + (offset if has_offsets else 0.0)
 
 
 def _one(what: str, value: Any, worlds: int) -> NDArray[Any]:

@@ -100,8 +100,9 @@ class Params:
         def read() -> NDArray[Any]:
             return self._columns(name).reshape(self._shape(name))
 
-        def write(values: NDArray[Any]) -> None:
+        def write(values: NDArray[Any], assigned: NDArray[np.bool_]) -> NDArray[Any]:
             self._write({name: values}, None, entries=True)
+            return values
 
         return PropertyArray.of(read, write, lambda problem: CommandRefused(f"params.{name} {problem}"))
 

@@ -17,7 +17,7 @@ from tightloop.entity import Entity
 from tightloop.errors import SceneError
 from tightloop.joint_order import JointOrder
 from tightloop.notebook import picture_html, table
-from tightloop.robot_properties import Modes, Numbers, PerDof, Positions
+from tightloop.robot_properties import Modes, Numbers, PerDof, Positions, position, velocity
 from tightloop.signatures import checked_calls
 
 
@@ -34,6 +34,9 @@ class Robot(Entity):
       after which exact names count. Other entries keep their values,
     - or by entries: ``arm.joint_q[:7] = 0.1``.
 
+    A mimic joint starts where its leader puts it, and so do its targets. Only an array, an entry, or the mimic joint's
+    own name gives it another value; a single value or a pattern that gives both does not.
+
     Where they are left out, ``pos`` and ``quat`` are the start of a floating base.
     """
 
@@ -41,12 +44,15 @@ class Robot(Entity):
 
     kind = "robot"
 
-    joint_q = Positions("Start positions [rad or m], shape ``(coords,)``.")
+    joint_q = Positions("Start positions [rad or m], shape ``(coords,)``.", follows=position)
     joint_target_q = Numbers(
         "Position targets of the drives at the start [rad or m], shape ``(dofs,)``; the start positions if not set.",
         otherwise="joint_q",
+        follows=position,
     )
-    joint_target_qd = Numbers("Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.")
+    joint_target_qd = Numbers(
+        "Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.", follows=velocity
+    )
     joint_target_mode = Modes(
         "Drive law of each dof: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
     )
@@ -169,6 +175,16 @@ class Robot(Entity):
         return {joint: mimic["joint"] for joint, mimic in joints if mimic is not None}
 
     @property
+    def _followers(self) -> list[tuple[str, str, float, float]]:
+        """Mimic joints: name, leader, multiplier and offset of ``q = multiplier * q_leader + offset``."""
+        joints = zip(self._summary["joint_names"], self._summary["joint_mimic"], strict=True)
+        return [
+            (joint, mimic["joint"], mimic["multiplier"], mimic["offset"])
+            for joint, mimic in joints
+            if mimic is not None
+        ]
+
+    @property
     def joint_range(self) -> NDArray[np.float64]:
         """Lower and upper position limit of each dof [rad or m], shape ``(dofs, 2)``; infinite without a limit."""
         unlimited = [-np.inf, np.inf]
@@ -251,10 +267,12 @@ class Robot(Entity):
 
     def table(self) -> dict[str, Any]:
         """Return the robot in the form of a scene file, with absolute paths and without properties that are not set."""
-        # a single value skips free joints, but values set on their drives must reach the daemon, which refuses them
-        single = all(self._summary["dof_driven"])
+        # a single value skips free joints and mimic joints, but values set on these must reach the daemon
+        single, spread = all(self._summary["dof_driven"]), not self._followers
         own = {
-            name: values if isinstance(values, tuple) else _portable(np.array(getattr(self, name)), single=single)
+            name: values
+            if isinstance(values, tuple)
+            else _portable(np.array(getattr(self, name)), single=single and (spread or name not in FOLLOWED))
             for name, values in self._own.items()
         }
         packages = [str(folder) for folder in self.package_dirs]
@@ -332,6 +350,8 @@ class Link:
         return self.name
 
 
+#: Properties of which a mimic joint has what its leader gives it.
+FOLLOWED = tuple(name for name, value in vars(Robot).items() if isinstance(value, Numbers) and value.follows)
 PER_DOF = tuple(name for name, value in vars(Robot).items() if isinstance(value, PerDof))
 
 

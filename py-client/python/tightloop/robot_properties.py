@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, overload
 
 import numpy as np
@@ -14,6 +14,9 @@ from tightloop.checks import Quaternion, Triple
 from tightloop.errors import SceneError
 from tightloop.written_arrays import PropertyArray
 
+#: How an entry was given: by itself, or by a value that is spread over several. A mimic joint follows its leader in the
+#: second case.
+_NAMED, _SPREAD = 1, 2
 MODES = ("position", "velocity", "both")
 
 
@@ -69,6 +72,11 @@ class Owner(Protocol):
 
     def start_targets(self) -> list[float]:
         """Return the targets that hold the start position."""
+        ...
+
+    @property
+    def _followers(self) -> list[tuple[str, str, float, float]]:
+        """Mimic joints: name, leader, multiplier and offset."""
         ...
 
     def _changed(self, attribute: str) -> None: ...
@@ -137,9 +145,26 @@ class PerDof:
 class Numbers(PerDof):
     """Real numbers, one per dof."""
 
-    def __init__(self, doc: str, *, otherwise: str | None = None, signed: bool = True, limit: bool = False) -> None:
+    def __init__(
+        self,
+        doc: str,
+        *,
+        otherwise: str | None = None,
+        signed: bool = True,
+        limit: bool = False,
+        follows: Callable[[float, float, float], float] | None = None,
+    ) -> None:
+        """Make a property.
+
+        Args:
+            doc: Its documentation.
+            otherwise: Property that it has the values of if it is not set.
+            signed: Whether values may be negative.
+            limit: Whether values may be infinite.
+            follows: What a mimic joint has, of its leader's value, its multiplier and its offset.
+        """
         super().__init__(doc)
-        self.otherwise, self.signed, self.limit = otherwise, signed, limit
+        self.otherwise, self.signed, self.limit, self.follows = otherwise, signed, limit, follows
 
     @overload
     def __get__(self, robot: None, owner: type) -> Numbers: ...
@@ -149,8 +174,9 @@ class Numbers(PerDof):
         if robot is None:
             return self
 
-        def write(values: NDArray[Any]) -> None:
-            self.__set__(robot, values)
+        def write(values: NDArray[Any], assigned: NDArray[np.bool_]) -> NDArray[Any]:
+            self._set(robot, values, assigned.astype(int))
+            return self.values(robot)
 
         return PropertyArray.of(lambda: self.values(robot), write, lambda problem: self.error(robot, problem))
 
@@ -164,11 +190,24 @@ class Numbers(PerDof):
     def __set__(self, robot: Owner, values: ArrayLike | Mapping[str, float]) -> None:
         names = self.names(robot)
         if isinstance(values, Mapping):
-            checked = self.values(robot)
+            checked, weights = self.values(robot), np.zeros(len(names), int)
             for place, value in self.named(robot, values).items():
                 checked[place] = self._reals(robot, value, f"of {self.entry} `{robot.name}/{names[place]}` ", ())
+                weights[place] = _NAMED if names[place] in values else _SPREAD
         else:
             checked = self._complete(robot, values)
+            weights = np.full(len(names), _SPREAD if np.ndim(values) == 0 else _NAMED)
+        self._set(robot, checked, weights)
+
+    def _set(self, robot: Owner, checked: NDArray[np.float64], weights: NDArray[Any]) -> None:
+        """Check and keep values.
+
+        Args:
+            robot: The robot.
+            checked: One value per entry.
+            weights: How each of them was given: 0 not at all, `_NAMED`, or `_SPREAD` if one value is for several.
+        """
+        names = self.names(robot)
         for name, value in zip(names, checked, strict=True):
             if not (np.isfinite(value) or (self.limit and value == np.inf)):
                 cure = "a finite number, or inf for no limit" if self.limit else "a finite number"
@@ -177,6 +216,11 @@ class Numbers(PerDof):
                 raise self.error(
                     robot, f"of {self.entry} `{robot.name}/{name}` is {value}; give a number of at least 0"
                 )
+        if self.follows is not None:
+            for name, leader, multiplier, offset in robot._followers:
+                own, lead = names.index(name), names.index(leader)
+                if weights[lead] and weights[own] != _NAMED:
+                    checked[own] = self.follows(checked[lead], multiplier, offset)
         robot._own[self.name] = checked
         robot._changed(self.name)
 
@@ -238,8 +282,8 @@ class Positions(Numbers):
             values[:7] = (*robot.pos, *robot.quat)
         return values
 
-    def __set__(self, robot: Owner, values: ArrayLike | Mapping[str, float]) -> None:
-        super().__set__(robot, values)
+    def _set(self, robot: Owner, checked: NDArray[np.float64], weights: NDArray[Any]) -> None:
+        super()._set(robot, checked, weights)
         # a base that stands where `pos` and `quat` put it moves with them
         robot._follows_pose = robot.floating and [*robot._own[self.name][:7]] == [*robot.pos, *robot.quat]
 
@@ -275,6 +319,16 @@ class Modes(PerDof):
                 raise self.error(robot, f"of dof `{robot.name}/{name}` is {mode!r}; choose one of {choices}")
         robot._own[self.name] = modes
         robot._changed(self.name)
+
+
+def position(leader: float, multiplier: float, offset: float) -> float:
+    """Return the position of a mimic joint at that of its leader."""
+    return offset + multiplier * leader
+
+
+def velocity(leader: float, multiplier: float, offset: float) -> float:
+    """Return the velocity of a mimic joint at that of its leader."""
+    return multiplier * leader
 
 
 def some(names: list[str], most: int = 3) -> str:

@@ -125,6 +125,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             joint_f: Joint torques [N·m or N], shape ``(worlds, dofs)`` or ``(dofs,)``, held over the substeps. The
                 effort limit does not clamp them. This and the two targets may also be a dict by robot, by joint or by
                 pattern, as in ``{"arm": targets, "dog/FL_hip": 0.1}``; dofs that are not named keep their last command.
+                Targets of mimic joints that are not named follow those of their leaders.
             joint_target_q: Position targets of the drives [rad or m], same shapes.
             joint_target_qd: Velocity targets of the drives [rad/s or m/s], same shapes.
             ctrl: Controls of the actuators of MuJoCo models, shape ``(worlds, actuators)`` or ``(actuators,)``, or a
@@ -258,7 +259,8 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     ) -> Frame:
         """Set joint positions and velocities, and what else MuJoCo models begin with.
 
-        Values that are left out and worlds outside the mask do not change.
+        Values that are left out and worlds outside the mask do not change. By name, mimic joints that a dict leaves out
+        follow their leaders. An array is taken as it is.
 
         A faulted world stays faulted.
 

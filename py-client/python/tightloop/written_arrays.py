@@ -22,21 +22,22 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
 
     _memory: NDArray[Any]
     _read: Callable[[], NDArray[Any]]
-    _write: Callable[[NDArray[Any]], None] | None = None
+    _write: Callable[[NDArray[Any], NDArray[np.bool_]], NDArray[Any]] | None = None
     _error: Callable[[str], Exception]
 
     @classmethod
     def of(
         cls,
         read: Callable[[], NDArray[Any]],
-        write: Callable[[NDArray[Any]], None],
+        write: Callable[[NDArray[Any], NDArray[np.bool_]], NDArray[Any]],
         error: Callable[[str], Exception],
     ) -> PropertyArray:
         """Make the array of a property.
 
         Args:
             read: Returns the property's values, in memory of their own, always of one shape.
-            write: Sets the property to other values of that shape.
+            write: Sets the property to values of that shape, and returns those that it then has. A mask says which
+                entries were assigned: others may follow them.
             error: Makes the exception of an assignment that does not fit, from the end of its message.
         """
         values = read()
@@ -52,7 +53,7 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
                 return np.array(part)
             part._memory, part._error = self._memory[key], self._error
             part._read = lambda: self._read()[key]
-            part._write = lambda values: self.__setitem__(key, values)
+            part._write = lambda values, assigned: self._assign(key, values, assigned)[key]
         return part
 
     def __setitem__(self, key: Any, value: Any) -> None:
@@ -60,14 +61,19 @@ class PropertyArray(np.ndarray[Any, np.dtype[Any]]):
             super().__setitem__(key, value)
             return
         value = np.array(value) if isinstance(value, PropertyArray) else value  # before its memory changes
+        self._assign(key, value, True)
+
+    def _assign(self, key: Any, value: Any, assigned: NDArray[np.bool_] | bool) -> NDArray[Any]:
+        assert self._write is not None
         self._refresh()
-        changed = self._memory.copy()
+        changed, mask = self._memory.copy(), np.zeros(self._memory.shape, bool)
         try:
             changed[key] = value
+            mask[key] = assigned
         except (IndexError, TypeError, ValueError) as problem:
             raise self._error(f"cannot be assigned at [{_shown(key)}]: {problem}") from None
-        self._write(changed)
-        self._memory[...] = changed
+        self._memory[...] = self._write(changed, mask)
+        return self._memory
 
     def _refresh(self) -> None:
         """Read the property again."""

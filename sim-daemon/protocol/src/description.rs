@@ -82,6 +82,9 @@ pub struct Description {
     pub sensors: Vec<[usize; 2]>,
     /// The robots with their ranges in the lists above.
     pub robots: Vec<RobotRange>,
+    /// Mimic joints. Older recordings list none.
+    #[serde(default)]
+    pub followers: Vec<Follower>,
     /// Rows of the field table: what every frame carries, in this order.
     pub fields: Vec<FieldInfo>,
     /// Every row that could have been asked for.
@@ -217,6 +220,19 @@ pub struct RobotRange {
     /// Its actuators. Older recordings have none.
     #[serde(default)]
     pub actuators: [usize; 2],
+}
+
+/// A joint that follows another one: q = offset + multiplier · q of the leader.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Follower {
+    /// `robot/joint` of the follower, which has one dof and one coordinate.
+    pub name: String,
+    /// `robot/joint` of its leader, likewise, which follows none.
+    pub leader: String,
+    /// Factor on the leader's position.
+    pub multiplier: f64,
+    /// Position at the leader's 0 [rad or m].
+    pub offset: f64,
 }
 
 /// One row of the field table.

@@ -76,7 +76,7 @@ pub use client::Client;
 pub use command::{Command, OnDevice, Values};
 pub use daemon_lock::{cleanup_after_death, sweep};
 pub use description::{
-    Description, FieldInfo, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
+    Description, FieldInfo, Follower, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
 };
 pub use device_memory::{Delivery, Descriptor, DeviceCommand, DeviceMemory};
 pub use discovery::{AttachOptions, find};

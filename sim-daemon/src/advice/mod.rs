@@ -1,6 +1,7 @@
 //! What is valid in a scene and most likely a mistake: told once, when a daemon starts, with the cure.
 
 mod draws;
+mod followers;
 mod friction;
 mod robots;
 mod start;
@@ -17,6 +18,7 @@ const NAMED: usize = 3;
 pub(crate) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
     let mut all = values::advice(scene);
     all.extend(robots::advice(scene));
+    all.extend(followers::advice(scene));
     all.extend(friction::advice(scene, model));
     all.extend(start::advice(scene, model));
     all

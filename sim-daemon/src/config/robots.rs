@@ -76,7 +76,7 @@ pub struct RobotTable {
     /// itself; left out, 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<i32>,
-    /// Positions at the start [rad or m]; left out, 0.
+    /// Positions at the start [rad or m]; left out, 0. Unless a list says otherwise, mimic joints start where their leaders put them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_q: Option<PerDof<Number>>,
     /// Position targets at the start [rad or m]; left out, the positions at the start.
@@ -168,10 +168,20 @@ impl RobotTable {
         if let Some(values) = &self.joint_q {
             robot.set_joint_q(&values.spread(&coords, 0.0, |value| value.0))?;
         }
+        // a list gives followers values of their own, a single value does not
+        if let Some(PerDof::All(_)) = self.joint_q {
+            robot.start_followers();
+        }
         for (values, set) in fields {
             if let Some(values) = values {
                 set(robot, &values.spread(&driven, 0.0, |value| value.0))?;
             }
+        }
+        if let Some(PerDof::All(_)) = self.joint_target_q {
+            robot.aim_followers();
+        }
+        if let Some(PerDof::All(_)) = self.joint_target_qd {
+            robot.pace_followers();
         }
         if let Some(modes) = &self.joint_target_mode {
             robot.set_joint_target_mode(&modes.spread(&driven, TargetMode::Position, |mode| {

@@ -55,6 +55,9 @@ class FileScene(DemoScene):
             low, high = robot.joint_range.T
             reach = np.where(np.isfinite(high - low), _SHARE * (high - low) / 2, _FREE) * robot.dof_driven
             target = np.clip(robot.joint_target_q + wave * reach, low, high)
+            for own, leader, multiplier, offset in robot._followers:
+                place, lead = (robot.dof_names.index(joint) for joint in (own, leader))
+                target[:, place] = multiplier * target[:, lead] + offset
             commands[name] = np.ascontiguousarray(target)
         ctrl = {name: middle + wave * reach for name, (middle, reach) in self._ranges.items()}
         given = {"joint_target_q": commands} if commands else {}

@@ -24,9 +24,13 @@ class Commands:
         dofs = len(names.dof_names)
         self.start = np.zeros(dofs, np.float32)
         self.range = np.tile(np.array([-np.inf, np.inf], np.float32), (dofs, 1))
+        self._followers: list[tuple[int, int, float, float]] = []
         for name, robot in scene.robots.items():
             self.start[names.dofs[name]] = robot.joint_target_q
             self.range[names.dofs[name]] = robot.joint_range
+            for own, leader, multiplier, offset in robot._followers:
+                places = (names.dof(f"{name}/{joint}") for joint in (own, leader))
+                self._followers.append((*places, multiplier, offset))
         self._worlds = worlds
         self._names, self._actuators = names.dof_names, names.actuator_names
         self._arrays: dict[str, NDArray[np.float32]] = {}
@@ -59,5 +63,9 @@ class Commands:
 
     @property
     def sent(self) -> dict[str, NDArray[np.float32]]:
-        """Arguments of a step, by name."""
+        """Arguments of a step, by name. Mimic joints that no control moves follow their leaders."""
+        targets = self._arrays.get("joint_target_q")
+        for own, leader, multiplier, offset in self._followers if targets is not None else ():
+            if ("joint_target_q", leader) in self._taken and ("joint_target_q", own) not in self._taken:
+                targets[:, own] = multiplier * targets[:, leader] + offset
         return self._arrays

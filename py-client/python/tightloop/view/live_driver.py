@@ -109,7 +109,7 @@ class LiveDriver:
         self._request(job)
 
     def set_target(self, dof: int, value: float, world: int, *, everywhere: bool) -> None:
-        """Set a joint's target, and play.
+        """Set a joint's target and those of the joints that mimic it, and play.
 
         Args:
             dof: Index of the joint in ``dof_names``.
@@ -120,7 +120,13 @@ class LiveDriver:
 
         def job() -> None:
             targets = self._all_targets(world, everywhere)
-            targets[... if targets.ndim == 1 else world, dof] = value
+            row = ... if targets.ndim == 1 else world
+            targets[row, dof] = value
+            name = self._sim.dof_names[dof]
+            for own in self._sim.info["followers"]:
+                if own["leader"] == name:
+                    follower = self._sim.dof_names.index(own["name"])
+                    targets[row, follower] = own["multiplier"] * value + own["offset"]
             self._targets, self._targets_sent = targets, False
 
         self._request(job, play=True)

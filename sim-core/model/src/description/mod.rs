@@ -2,6 +2,7 @@
 
 mod balance;
 mod dofs;
+mod followers;
 mod frames;
 mod joint;
 mod mujoco;
@@ -16,6 +17,7 @@ mod shapes;
 pub(crate) use crate::geometry::Shape;
 pub(crate) use crate::inertia::Inertial;
 pub(crate) use crate::joint_kind::JointKind;
+pub(crate) use followers::start_followers;
 pub(crate) use frames::Bearer;
 pub use joint::{Joint, JointDof, Mimic, TargetMode};
 pub use mujoco::{

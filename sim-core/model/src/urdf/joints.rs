@@ -7,7 +7,7 @@ use urdf_rs::JointType;
 
 use super::reader::Reader;
 use super::scan::{children, has};
-use crate::description::{Joint, JointKind, Mimic};
+use crate::description::{Joint, JointKind, Mimic, start_followers};
 use crate::error::{ModelError, first_few};
 
 /// A range this wide on both sides means no range, such as 1e16 in SDFormat [rad or m].
@@ -195,7 +195,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         Ok(())
     }
 
-    /// A follower of a follower gets the first leader: q = o₁ + m₁ (o₂ + m₂ q_leader).
+    /// A follower of a follower gets the first leader: q = o₁ + m₁ (o₂ + m₂ q_leader). It starts where that puts it.
     fn mimics(&self, urdf: &urdf_rs::Robot, joints: &mut [Joint]) -> Result<(), ModelError> {
         let index: HashMap<&str, usize> = urdf
             .joints
@@ -268,6 +268,7 @@ impl<'a, 'input> Reader<'a, 'input> {
                 });
             }
         }
+        start_followers(joints);
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! Joints that follow others.
 
 use proptest::prelude::*;
-use sim_model::Mimic;
+use sim_model::{Mimic, Robot};
 
 use crate::build::{INERTIAL, LIMIT, assert_says, joint, link, read};
 
@@ -102,4 +102,38 @@ proptest! {
             prop_assert!((flat - expected).abs() <= 32.0 * f64::EPSILON * 3.0_f64.powi(9), "{} {}", flat, expected);
         }
     }
+}
+
+#[test]
+fn followers_start_where_their_leader_puts_them() {
+    // j0 follows j2, which follows j1
+    let mimic = |leader, ratio, offset| {
+        format!("<mimic joint=\"{leader}\" multiplier=\"{ratio}\" offset=\"{offset}\"/>")
+    };
+    let mut robot = read(&fan(&[
+        ("revolute", mimic("j2", 2.0, 0.25)),
+        ("revolute", String::new()),
+        ("prismatic", mimic("j1", -0.5, 0.125)),
+    ]))
+    .unwrap();
+    let starts = |robot: &Robot| {
+        let joints = robot.joints.iter();
+        joints.map(|joint| joint.q.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(starts(&robot), [[0.5], [0.0], [0.125]]);
+    robot.joints[1].q = vec![1.0];
+    robot.start_followers();
+    assert_eq!(starts(&robot), [[-0.5], [1.0], [-0.375]]);
+    // their targets are their starts, until the leader has one
+    robot.aim_followers();
+    assert_eq!(robot.joints[0].dofs[0].target_q, None);
+    robot.joints[1].dofs[0].target_q = Some(0.5);
+    robot.joints[1].dofs[0].target_qd = 2.0;
+    robot.aim_followers();
+    robot.pace_followers();
+    let targets = [0, 2].map(|joint| {
+        let dof = &robot.joints[joint].dofs[0];
+        (dof.target_q, dof.target_qd)
+    });
+    assert_eq!(targets, [(Some(0.0), -2.0), (Some(-0.125), -1.0)]);
 }

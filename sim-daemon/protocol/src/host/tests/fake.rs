@@ -62,6 +62,7 @@ fn description() -> Description {
         sensor_names: Vec::new(),
         sensors: Vec::new(),
         robots: Vec::new(),
+        followers: Vec::new(),
         fields: Vec::new(),
         known_fields: Vec::new(),
         commands: vec![input("joint_f")],
