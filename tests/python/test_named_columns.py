@@ -91,3 +91,64 @@ def test_actuators_of_a_mujoco_model_by_name():
     with tl.launch(scene, worlds=2, fields=("ctrl",)) as sim:
         name = sim.actuator_names[0]
         assert sim.step(ctrl={name: [0.25, -0.5]}).ctrl[:, 0].tolist() == [0.25, -0.5]
+
+
+def test_forces_by_body_robot_and_pattern_are_those_of_an_array(tmp_path):
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_urdf(URDF, name="arm")
+    scene.add_cube(pos=(1, 0, 1), name="cube")
+    force = {"arm/fr3_hand": (0, 0, -5, 0, 0, 1), "cube": np.arange(18.0).reshape(3, 6), "arm/fr3_link[34]": [1.0] * 6}
+    with tl.launch(scene, worlds=3, params=("body_f",), fields=FIELDS, precision="f64") as sim:
+        array = np.zeros((3, len(sim.body_names), 6))
+        array[:, sim.body_names.index("arm/fr3_hand")] = force["arm/fr3_hand"]
+        array[:, sim.bodies["cube"]] = force["cube"][:, None]
+        for link in (3, 4):
+            array[:, sim.body_names.index(f"arm/fr3_link{link}")] = 1.0
+        kept = sim.snapshot()
+        expected = sim.step(body_f=array).copy()
+        assert np.abs(expected.joint_qd).max() > 0.0
+        sim.restore(kept)
+        found = sim.step(body_f=force).copy()
+        np.testing.assert_array_equal(found.joint_q, expected.joint_q)
+        np.testing.assert_array_equal(sim.params.body_f, array)
+        # bodies that are not named keep their force
+        array[:, sim.bodies["arm"]] = 0.0
+        array[:, sim.body_names.index("arm/fr3_hand"), 2] = 7.0
+        sim.send(body_f={"arm": np.zeros((sim.bodies["arm"].stop, 6)), "arm/fr3_hand": (0, 0, 7, 0, 0, 0)})
+        sim.recv()
+        np.testing.assert_array_equal(sim.params.body_f, array)
+        sim.params.body_f = {"cube": [1, 2, 3, 4, 5, 6], "arm": {"fr3_link1": np.ones((3, 6))}}
+        array[:, sim.bodies["cube"]] = [1, 2, 3, 4, 5, 6]
+        array[:, sim.body_names.index("arm/fr3_link1")] = 1.0
+        np.testing.assert_array_equal(sim.params.body_f, array)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"arm/fr3_hnad": [0.0] * 6}, r"key 'arm/fr3_hnad', which nothing matches; did you mean `arm/fr3_hand`"),
+        ({"hand": [0.0] * 6}, r"no robot `hand`; .*Bodies are named with it, such as 'cube/body'"),
+        (
+            {"arm/fr3_hand": [0.0] * 3},
+            r"`arm/fr3_hand`: expected shape \(6,\) for every world alike, or \(3, 6\).*\(3,\)",
+        ),
+        ({"arm": [0.0] * 6}, r"body_f of `arm`: expected shape \(\d+, 6\)"),
+        ({3: [0.0] * 6}, r"key 3; give names of robots or of bodies"),
+        ({"arm/fr3_hand": {"x": 1}}, r"give 6 numbers"),
+        ({"arm/fr3_hand": [np.nan] * 6}, r"body_f"),
+    ],
+    ids=str,
+)
+def test_forces_that_fit_no_body_are_refused_by_name(given, words):
+    scene = tl.Scene()
+    scene.add_urdf(URDF, name="arm")
+    scene.add_cube(pos=(1, 0, 1), name="cube")
+    with tl.launch(scene, worlds=3, params=("body_f",)) as sim:
+        with pytest.raises(tl.CommandRefused, match=words):
+            sim.step(body_f=given)
+        assert not sim.params.body_f.any()
+
+
+def test_forces_by_name_need_the_parameter(sim):
+    with pytest.raises(tl.ConstantParameter, match=r"params=\(\"body_f\",\)"):
+        sim.step(body_f={"arm/fr3_hand": [0.0] * 6})

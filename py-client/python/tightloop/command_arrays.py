@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop.errors import CommandRefused
 from tightloop.inputs import as_array, real_numbers, switches
+from tightloop.named_columns import Runs
 from tightloop.params import Params
 
 #: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot,
@@ -23,8 +24,8 @@ _PREPARED: tuple[str, ...] = ("mocap_pos", "mocap_quat", "eq_active", "body_f")
 
 def ready_arrays(
     info: Mapping[str, Any], params: Callable[[], Params], group: str, given: Mapping[str, Command | None]
-) -> dict[str, NDArray[np.float64]]:
-    """Return what is given as arrays, shape ``(worlds, columns)``, by name.
+) -> dict[str, NDArray[np.float64] | Runs]:
+    """Return what is given as arrays, shape ``(worlds, columns)``, or as runs of columns of such, by name.
 
     Args:
         info: The daemon's description.
@@ -35,12 +36,12 @@ def ready_arrays(
     Raises:
         CommandRefused: A shape or dtype is wrong, or no model of the scene has the name.
     """
-    found = {}
+    found: dict[str, NDArray[np.float64] | Runs] = {}
     for name, value in given.items():
         if value is None:
             continue
         if name == "body_f":  # varies only where the run says so, which `Params` knows
-            found[name] = params().ready(name, value)
+            found[name] = params().ready_columns(name, value)
             continue
         columns = {known["name"]: known["columns"] for known in info[group]}
         if name not in columns:

@@ -13,6 +13,8 @@ from tightloop.attributes import nearest
 from tightloop.errors import CommandRefused
 from tightloop.inputs import as_array, real_numbers
 
+#: Neighbouring columns: the first of them, and their values, shape ``(worlds, columns)``.
+Runs = list[tuple[int, NDArray[np.float64]]]
 #: Name, first column, end, and columns of a floating base.
 Place = tuple[str, int, int, int]
 #: A mimic joint, its leader, and multiplier and offset of its position.
@@ -31,7 +33,8 @@ def named_columns(
     robots: Sequence[Place],
     *,
     followers: Sequence[Follower] = (),
-) -> list[tuple[int, NDArray[np.float64]]]:
+    parts: int = 1,
+) -> Runs:
     """Return the columns that a dict gives, as runs of neighbours: first column, and array ``(worlds, columns)``.
 
     A key is a robot (``"arm"``), a full name (``"arm/joint1"``) or a pattern for full names (``"arm/.*_hip"``). The
@@ -48,6 +51,7 @@ def named_columns(
         names: Names of all columns.
         robots: The robots.
         followers: The mimic joints.
+        parts: Columns of each name, 6 for forces on bodies.
 
     Raises:
         CommandRefused: A key means nothing, or a column has two values; or a shape or dtype is wrong.
@@ -67,16 +71,17 @@ def named_columns(
     def by_name(key: str, value: Any, prefix: str) -> None:
         full = prefix + key
         if full in places:
-            put(2, key, places[full], _one(f"{field} of `{full}`", value, worlds))
+            put(2, key, places[full], _one(f"{field} of `{full}`", value, worlds, parts))
             return
         found = _matching(field, full, names, owners, inside=bool(prefix))
-        values = _one(f"{field} of {key!r}", value, worlds)
+        values = _one(f"{field} of {key!r}", value, worlds, parts)
         for place in found:
             put(1, key, place, values)
 
     for key, value in given.items():
         if not isinstance(key, str):
-            raise CommandRefused(f"{field} has the key {key!r}; give names of robots or of joints, {_example(names)}")
+            kind = _kind(field)
+            raise CommandRefused(f"{field} has the key {key!r}; give names of robots or of {kind}, {_example(names)}")
         robot = owners.get(key)
         if robot is None:
             by_name(key, value, "")
@@ -87,13 +92,16 @@ def named_columns(
                 by_name(own, part, f"{key}/")
         else:
             _, start, stop, base = robot
-            array = as_array(field, key, value, worlds, stop - start, base=base)
+            if parts > 1:
+                array = _bodies(f"{field} of `{key}`", value, worlds, stop - start, parts)
+            else:
+                array = as_array(field, key, value, worlds, stop - start, base=base)
             for column, place in enumerate(range(stop - array.shape[1], stop)):
                 put(0, key, place, array[:, column])
     _check_quaternions(field, columns.keys(), names)
     if field in _FOLLOWED:
         _follow(columns, places, followers, has_offsets=_FOLLOWED[field])
-    return _runs(columns)
+    return _runs(columns, parts)
 
 
 def _follow(
@@ -111,14 +119,38 @@ def _follow(
             columns[places[name]] = rank, key, multiplier * values + (offset if has_offsets else 0.0)
 
 
-def _one(what: str, value: Any, worlds: int) -> NDArray[Any]:
-    """Return the values of one column in each world."""
+def _one(what: str, value: Any, worlds: int, parts: int) -> NDArray[Any]:
+    """Return the values of one name in each world, shape ``(worlds,)``, or ``(worlds, parts)`` of several parts."""
     if isinstance(value, Mapping):
-        raise CommandRefused(f"{what} is {value!r:.80}; give a number, or one per world")
+        expected = "a number, or one per world" if parts == 1 else f"{parts} numbers"
+        raise CommandRefused(f"{what} is {value!r:.80}; give {expected}")
     given = real_numbers(what, value)
+    if parts > 1:
+        if given.shape not in ((parts,), (worlds, parts)):
+            raise CommandRefused(f"{what}: {_expected(worlds, (), parts)}; got {given.shape}")
+        return np.broadcast_to(given.astype(np.float64), (worlds, parts))
     if given.shape not in ((), (1,), (worlds,), (worlds, 1)):
         raise CommandRefused(f"{what}: expected a number, or shape {(worlds,)}; got {given.shape}")
     return np.broadcast_to(given.reshape(-1).astype(np.float64), (worlds,))
+
+
+def _bodies(what: str, value: Any, worlds: int, bodies: int, parts: int) -> NDArray[Any]:
+    """Return the values of all bodies of a robot, shape ``(worlds, bodies, parts)``."""
+    given = real_numbers(what, value)
+    if bodies == 1 and given.shape in ((parts,), (worlds, parts)):  # a free body, or a robot of one link
+        given = given.reshape(-1, 1, parts)
+    if given.shape not in ((bodies, parts), (worlds, bodies, parts), (1, bodies, parts)):
+        raise CommandRefused(f"{what}: {_expected(worlds, (bodies,), parts)}; got {given.shape}")
+    return np.broadcast_to(given.astype(np.float64), (worlds, bodies, parts))
+
+
+def _expected(worlds: int, bodies: tuple[int, ...], parts: int) -> str:
+    alike, own = (*bodies, parts), (worlds, *bodies, parts)
+    return f"expected shape {alike} for every world alike, or {own}: the force, then the torque"
+
+
+def _kind(field: str) -> str:
+    return "bodies" if field == "body_f" else "joints"
 
 
 def _matching(
@@ -142,7 +174,8 @@ def _matching(
         near = nearest(pattern, owners)
         joints = [name for name in names if name.rpartition("/")[2] == pattern]
         cure = f"did you mean `{(near or joints)[0]}`?" if near or joints else _there(owners)
-        raise CommandRefused(f"{field}: no robot `{pattern}`; {cure} Joints are named with it, {_example(names)}")
+        kind = _kind(field).capitalize()
+        raise CommandRefused(f"{field}: no robot `{pattern}`; {cure} {kind} are named with it, {_example(names)}")
     robot = pattern.partition("/")[0]
     if robot not in owners:
         near = nearest(robot, owners)
@@ -173,7 +206,7 @@ def _check_quaternions(field: str, places: Collection[int], names: Sequence[str]
                 raise CommandRefused(f"{field} of `{name}` is a part of a quaternion; give `{owner}.qx` to `.qw`")
 
 
-def _runs(columns: Mapping[int, tuple[int, Any, NDArray[Any]]]) -> list[tuple[int, NDArray[np.float64]]]:
+def _runs(columns: Mapping[int, tuple[int, Any, NDArray[Any]]], parts: int) -> Runs:
     """Join neighbouring columns."""
     runs: list[tuple[int, list[NDArray[Any]]]] = []
     for place in sorted(columns):
@@ -181,4 +214,5 @@ def _runs(columns: Mapping[int, tuple[int, Any, NDArray[Any]]]) -> list[tuple[in
             runs[-1][1].append(columns[place][2])
         else:
             runs.append((place, [columns[place][2]]))
-    return [(first, np.ascontiguousarray(np.stack(own, axis=1), dtype=np.float64)) for first, own in runs]
+    joined = [(first * parts, np.stack(own, axis=1).reshape(len(own[0]), -1)) for first, own in runs]
+    return [(first, np.ascontiguousarray(own, dtype=np.float64)) for first, own in joined]

@@ -13,6 +13,7 @@ from tightloop._core import Frame
 from tightloop.attributes import nearest
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
 from tightloop.inputs import as_mask, real_numbers
+from tightloop.named_columns import Runs, named_columns
 from tightloop.params_advice import ParamsAdvice
 from tightloop.signatures import checked_calls
 from tightloop.written_arrays import PropertyArray
@@ -67,7 +68,7 @@ class Params:
         CommandRefused: The values do not fit; nothing was written.
     """
 
-    __slots__ = ("_advice", "_client", "_known", "_numbers", "_state", "_worlds")
+    __slots__ = ("_advice", "_client", "_info", "_known", "_numbers", "_state", "_worlds")
 
     def __init__(
         self,
@@ -78,6 +79,7 @@ class Params:
     ) -> None:
         super().__setattr__("_advice", looks)
         super().__setattr__("_client", client)
+        super().__setattr__("_info", info)
         super().__setattr__("_worlds", info["worlds"])
         super().__setattr__("_state", state)
         super().__setattr__("_known", {param["info"]["name"]: param for param in info["params"]})
@@ -117,7 +119,8 @@ class Params:
 
         Args:
             mask: Worlds to write, bool, shape ``(worlds,)``; all if left out.
-            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for all.
+            **params: Arrays by name, each ``(worlds, ...)``, ``(...)`` for identical worlds, or one number for all;
+                ``body_f`` also a dict as in `Sim.step`.
 
         Returns:
             A frame at the current state. Raises as `Sim.step` does, and UnknownField.
@@ -125,7 +128,7 @@ class Params:
         return self._write(params, mask)
 
     def _write(self, params: Mapping[str, ArrayLike], mask: ArrayLike | None, *, entries: bool = False) -> Frame:
-        given = {name: self.ready(name, value) for name, value in params.items()}
+        given = {name: self.ready_columns(name, value) for name, value in params.items()}
         if self._advice is not None:
             worlds = None if mask is None else as_mask("mask", mask, self._worlds)
             self._advice.look(given, worlds, self._columns, entries=entries)
@@ -136,6 +139,14 @@ class Params:
         # parameters are the last values of a world's record
         first = self._numbers - self._known[name]["place"]
         return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
+
+    def ready_columns(self, name: str, value: Any) -> NDArray[np.float64] | Runs:
+        """Convert a value as `ready` does or, of a dict of forces by robot, body or pattern, to runs of columns."""
+        if name != "body_f" or not isinstance(value, Mapping):
+            return self.ready(name, value)
+        self._varying(name)
+        robots = [(robot["name"], *robot["bodies"], 0) for robot in self._info["robots"]]
+        return named_columns(name, value, self._worlds, self._info["body_names"], robots, parts=PARTS[name])
 
     def ready(self, name: str, value: Any) -> NDArray[np.float64]:
         """Convert a value of a parameter to a contiguous float64 array, shape ``(worlds, columns)``.

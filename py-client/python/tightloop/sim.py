@@ -137,7 +137,9 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             eq_active: Whether equalities of MuJoCo models act, 0 or 1 or bool, shape ``(worlds, equalities)`` or
                 ``(equalities,)``, in the order of `equality_names`.
             body_f: Force on each body at its centre of mass [N], then torque [N·m], in world axes, shape
-                ``(worlds, bodies, 6)`` or ``(bodies, 6)``. It needs ``launch(params=("body_f",))``.
+                ``(worlds, bodies, 6)`` or ``(bodies, 6)``, or a dict of such by robot, by body or by pattern, as in
+                ``{"arm/hand": (0, 0, -5, 0, 0, 0)}``. Bodies that are not named keep their last force. It needs
+                ``launch(params=("body_f",))``.
 
         Returns:
             A frame of read-only views, which stays valid and unchanged until you drop it.
