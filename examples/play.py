@@ -22,6 +22,7 @@ from filming import film_of
 from numpy.typing import NDArray
 from training import needed
 
+from evaluation import metrics
 from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.view import Film
 from tightloop.view.cameras import PRESETS
@@ -42,23 +43,30 @@ def play(
 ) -> dict[str, NDArray[np.float64]]:
     """One episode in every world: what was seen, done, and got, ``(steps, worlds, …)``; NaN after an episode's end."""
     obs, _ = envs.reset(seed=seed)
-    going, kept = np.ones(envs.num_envs, bool), {"obs": [], "action": [], "reward": [], "success": []}
+    going, kept = np.ones(envs.num_envs, bool), {"obs": [], "action": [], "reward": []}
     while going.any():
         if film is not None:
             film.add(envs.frame, goals=envs.marks)
         (action,) = policy.run(["action"], {"obs": obs})
         seen = obs
         obs, reward, terminated, truncated, infos = envs.step(action)
-        step = {
-            "obs": seen,
-            "action": action,
-            "reward": reward,
-            "success": infos.get("success", np.zeros(envs.num_envs)),
-        }
+        step = {"obs": seen, "action": action, "reward": reward}
+        # a task may define no success
+        step |= {name: value for name, value in metrics(infos) if name == "success"}
         for name, array in step.items():
-            kept[name].append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
+            kept.setdefault(name, []).append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
         going &= ~(terminated | truncated)
     return {name: np.array(arrays) for name, arrays in kept.items()}
+
+
+def summary(task: str, kept: dict[str, NDArray[np.float64]]) -> str:
+    """The return of the episodes, and how many end in success, if the task defines it."""
+    returns, worlds = np.nansum(kept["reward"], axis=0), kept["reward"].shape[1]
+    text = f"{task}: return {returns.mean():.3g} ± {returns.std():.2g}"
+    if "success" not in kept:
+        return text
+    last = np.isfinite(kept["reward"]).sum(axis=0) - 1
+    return f"{text}, success at the end {kept['success'][last, np.arange(worlds)].mean():.1%}"
 
 
 def draw(path: Path, kept: dict[str, NDArray[np.float64]], envs: VectorEnv, title: str) -> None:
@@ -106,10 +114,7 @@ def main() -> None:
             raise SystemExit(f"{args.policy} takes {expected} numbers, and {args.task} has {size}")
         with film_of(envs, args.film, args.camera) if args.film else nullcontext() as film:
             kept = play(envs, policy, args.seed, film)
-        returns = np.nansum(kept["reward"], axis=0)
-        last = np.isfinite(kept["reward"]).sum(axis=0) - 1
-        success = kept["success"][last, np.arange(args.num_envs)].mean()
-        title = f"{args.task}: return {returns.mean():.3g} ± {returns.std():.2g}, success at the end {success:.1%}"
+        title = summary(args.task, kept)
         draw(out, kept, envs, title)
         print(f"{title}, {args.num_envs} worlds\npicture: {out}")
     finally:

@@ -11,6 +11,7 @@ from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "examples"))
 from evaluation import interval, told_with_intervals
+from tightloop.tasks.cartpole import CartPoleBalance
 
 
 def test_few_values_have_students_interval() -> None:
@@ -36,3 +37,34 @@ def test_95_of_100_intervals_hold_the_mean(count: int) -> None:
 
 def test_means_are_told_with_their_intervals() -> None:
     assert told_with_intervals({"return": np.array([1.0, 2.0, 3.0])}) == "return 2 (-0.4843 to 4.484)"
+
+
+class NoSuccess(CartPoleBalance):
+    """A task that says nothing of success."""
+
+    max_episode_steps = 5
+
+
+class Upright(NoSuccess):
+    def success(self, xp, worlds):
+        """Half of the worlds, whatever they do."""
+        return worlds.joint_q[:, 0] * 0.0 + xp.arange(len(worlds.joint_q)) % 2 > 0.5
+
+
+class Still:
+    """A policy that does nothing."""
+
+    def run(self, _names, given):
+        return [np.zeros((len(given["obs"]), 1), np.float32)]
+
+
+@pytest.mark.parametrize(("task", "end"), [(NoSuccess, "± 0"), (Upright, "± 0, success at the end 50.0%")])
+def test_a_played_policy_has_a_success_only_if_its_task_has_one(task, end, envs) -> None:
+    pytest.importorskip("onnxruntime")
+    pytest.importorskip("matplotlib")
+    import play
+
+    made = envs(task, 4, autoreset_mode="SameStep")
+    kept = play.play(made, Still(), 0, None)
+    assert ("success" in kept) == (task is Upright)
+    assert play.summary("Own", kept) == f"Own: return 5 {end}"
