@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -122,3 +123,49 @@ def test_a_dead_daemon_is_told(served):
     with pytest.raises(tl.DaemonLost, match=str(pid)):
         sim.step()
     sim.close()
+
+
+def test_a_daemon_that_is_still_starting_is_waited_for(pendulum, tmp_path, unique):
+    file, name = tmp_path / "scene.toml", unique()
+    pendulum.save(file)
+    with pytest.raises(tl.UnknownDaemon):
+        tl.attach(name)
+    # it starts after a moment, as the other pane of a terminal does
+    late = "import sys, time, runpy; time.sleep(0.5); runpy.run_module('tightloop', run_name='__main__')"
+    command = [sys.executable, "-c", late, "serve", str(file), "--worlds=3", f"--name={name}"]
+    with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            with tl.attach(name, timeout=60.0) as sim:
+                assert sim.step().step.tolist() == [1, 1, 1]
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+
+
+def test_both_groups_of_a_daemon_that_is_still_starting_are_waited_for(pendulum, tmp_path, unique):
+    file, name = tmp_path / "scene.toml", unique()
+    pendulum.save(file)
+    command = [sys.executable, "-m", "tightloop", "serve", str(file), "--worlds=4", "--groups=2", f"--name={name}"]
+    with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            groups = tl.attach(name, timeout=60)
+            assert [sim.worlds for sim in groups] == [2, 2]
+            groups.close()
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(10)
+
+
+@pytest.mark.parametrize("timeout", [0, 0.3])
+def test_the_wait_for_a_daemon_ends_with_the_daemons_that_there_are(timeout, served):
+    name, _ = served
+    begun = time.monotonic()
+    with pytest.raises(tl.UnknownDaemon, match=rf"`?absent`?.*{name}.*waited {timeout:g} s"):
+        tl.attach("absent", timeout=timeout)
+    assert timeout <= time.monotonic() - begun < timeout + 5.0
+
+
+@pytest.mark.parametrize("timeout", [-1, float("nan"), "soon"])
+def test_a_wait_that_is_no_time_is_refused(timeout):
+    with pytest.raises(tl.ArgumentError, match="attach: timeout is"):
+        tl.attach("absent", timeout=timeout)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import os
 import secrets
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
 from tightloop import _core, advice, checks
 from tightloop.attributes import suggestion
 from tightloop.daemon import Daemon
-from tightloop.errors import ArgumentError
+from tightloop.errors import ArgumentError, UnknownDaemon
 from tightloop.groups import Groups
 from tightloop.realtime import RealTime
 from tightloop.realtime import arguments as realtime_arguments
 from tightloop.scene import Scene
 from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
+
+#: How often `attach` looks for a daemon that is still starting [s].
+_ATTACH_SECONDS = 0.02
 
 
 @overload
@@ -247,7 +251,7 @@ def _names(daemon: str, groups: int) -> list[str]:
 
 
 @checked_calls
-def attach(name: str) -> Sim | Any:
+def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
     """Join a running daemon, which continues when this client ends.
 
     The first command makes this client the controller. Until it releases control, the commands of other clients raise
@@ -255,15 +259,33 @@ def attach(name: str) -> Sim | Any:
 
     Args:
         name: Name of the daemon, or ``"franka.0"`` for one of its groups.
+        timeout: How long to wait for a daemon that is still starting [s]; ``inf`` is no limit. If left out, the daemon
+            has to be ready.
 
     Returns:
         A `Sim`, or the `Groups` of a daemon with several groups.
 
     Raises:
-        ArgumentError: The name is not valid for a daemon.
-        UnknownDaemon: No daemon of that name is running; the message lists those that are.
+        ArgumentError: The name is not valid for a daemon, or the timeout is not.
+        UnknownDaemon: No daemon of that name is running, or was ready in time; the message lists those that are.
         ProtocolMismatch: The daemon has another version.
     """
-    count = _core.groups(checks.text("attach: name", name, error=ArgumentError))
+    name = checks.text("attach: name", name, error=ArgumentError)
+    if timeout is None:
+        return _attach(name)
+    seconds = checks.number("attach: timeout", timeout, least=0.0, infinite=True, error=ArgumentError)
+    end = time.monotonic() + seconds
+    while True:
+        try:
+            return _attach(name)
+        except UnknownDaemon as problem:
+            left = end - time.monotonic()
+            if left <= 0.0:
+                raise UnknownDaemon(f"{problem} (waited {seconds:g} s for it)") from None
+        time.sleep(min(_ATTACH_SECONDS, left))
+
+
+def _attach(name: str) -> Sim | Any:
+    count = _core.groups(name)
     sims = [Sim(_core.Client(own, lease=False), None) for own in _names(name, count)]
     return sims[0] if count == 1 else Groups(name, sims)
