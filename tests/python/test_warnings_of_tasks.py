@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 from collections.abc import Sequence
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
+from conftest import REPOSITORY
 from tightloop.env import Observed, VectorEnv
 from tightloop.env.bounds_watch import BoundsWatch
 from tightloop.tasks.cartpole import CartPoleBalance
@@ -137,3 +140,96 @@ def test_fields_that_worlds_do_not_have_suggest_those_that_they_have():
             envs.step(np.zeros((1, 1)))
     finally:
         envs.close()
+
+
+def told_of(define) -> list[str]:
+    """Define a task, make an environment of it, and return what is warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        VectorEnv(define(), 1).close()
+    return [str(warning.message) for warning in caught]
+
+
+@pytest.mark.parametrize(
+    ("member", "value", "cure"),
+    [
+        ("terminate", lambda self, xp, worlds: worlds.joint_q[:, 0] > 1, "a Task has `terminated`"),
+        ("truncate", lambda self, xp, worlds: worlds.joint_q[:, 0] > 1, "a Task has `truncated`"),
+        ("metric", lambda self, xp, worlds: {}, "a Task has `metrics`"),
+        ("sucess", lambda self, xp, worlds: None, "a Task has `success`"),
+        ("rewards", lambda self, xp, worlds: 0, "a Task has `reward`"),
+        ("reward_term", lambda self, xp, worlds: {}, "a Task has `reward_terms`"),
+        ("observes", lambda self, xp, worlds: (), "a Task has `observe`"),
+        ("inital_state", lambda self, xp, worlds, draws: {}, "a Task has `initial_state`"),
+        ("disturbance", lambda self: (), "a Task has `disturbances`"),
+        ("mirror", lambda self: None, "a Task has `mirrored`"),
+        ("Terminated", lambda self, xp, worlds: None, "a Task has `terminated`"),
+        ("max_steps", 50, "a Task has `max_episode_steps`"),
+        ("max_epsiode_steps", 50, "a Task has `max_episode_steps`"),
+        ("reward_weight", {"upright": 1.0}, "a Task has `reward_weights`"),
+        ("goal_draw", 3, "a Task has `goal_draws`"),
+        ("launch_option", {}, "a Task has `launch_options`"),
+        ("step_dt", 0.02, "dt * substeps of its scene is the length of a control step"),
+        ("decimation", 4, "give scene() a Scene(substeps=…)"),
+        ("num_envs", 4, "give it to VectorEnv"),
+    ],
+)
+def test_a_misspelt_member_is_told_with_the_right_name(member, value, cure):
+    [warning] = told_of(lambda: type("Own", (CartPoleBalance,), {member: value}))
+    assert warning == f"task Own: nothing uses its `{member}`; {cure}"
+
+
+def test_a_misspelt_attribute_of_a_task_itself_is_told():
+    class Own(CartPoleBalance):
+        def __init__(self) -> None:
+            super().__init__()
+            self.max_steps = 40
+            self.goals = [1, 2]  # no Task has a value of such a name
+
+    [warning] = told_of(lambda: Own)
+    assert warning == "task Own: nothing uses its `max_steps`; a Task has `max_episode_steps`"
+
+
+def test_members_that_a_task_itself_uses_are_no_mistake():
+    class Own(CartPoleBalance):
+        step_dt = 0.02
+        limits = (1.0, 2.0)
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.max_steps = 40
+
+        def terminate(self, worlds):
+            return worlds.joint_q[:, 0] > self.step_dt
+
+        def terminated(self, xp, worlds):
+            return self.terminate(worlds) & (worlds.elapsed < self.max_steps)
+
+        @property
+        def metric(self):
+            return 1.0
+
+        def metrics(self, xp, worlds):
+            return {"own": worlds.joint_q[:, 0]}
+
+    assert told_of(lambda: Own) == []
+
+
+def test_tasks_of_the_package_and_of_the_examples_have_no_misspelt_members():
+    program = """
+import importlib, pkgutil, sys, warnings
+warnings.simplefilter("error")
+import tightloop.tasks
+from tightloop.env import Task
+from tightloop.env.registry import GYMNASIUM_TASKS, TASKS, make_task
+from tightloop.env.task_members import tell_of_attributes
+for module in pkgutil.walk_packages(tightloop.tasks.__path__, "tightloop.tasks."):
+    importlib.import_module(module.name)
+for name in (*TASKS, *GYMNASIUM_TASKS, *sys.argv[1:]):
+    tell_of_attributes(make_task(name, {}), Task)
+"""
+    pytest.importorskip("mujoco")
+    examples = REPOSITORY / "examples"
+    own = [f"{examples}/own_task.py:Circle"]
+    done = subprocess.run([sys.executable, "-c", program, *own], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

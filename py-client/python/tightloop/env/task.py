@@ -10,12 +10,13 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, advice, checks
+from tightloop import _core, checks
 from tightloop.attributes import nearest
 from tightloop.env.controls import Control
 from tightloop.env.disturbances import Push
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
+from tightloop.env.task_members import tell_of_class
 from tightloop.errors import ArgumentError, UnknownAttribute
 from tightloop.scene import Scene
 from tightloop.signatures import checked_calls
@@ -142,26 +143,6 @@ class _Undefined(ArgumentError, NotImplementedError):
     pass
 
 
-#: Members of tasks elsewhere, or mistyped ones, and those of a Task that are most likely meant.
-_FOREIGN = {
-    "compute_reward": "reward",
-    "done": "terminated",
-    "dones": "terminated",
-    "get_obs": "observe",
-    "get_observation": "observe",
-    "get_observations": "observe",
-    "get_reward": "reward",
-    "is_done": "terminated",
-    "is_success": "success",
-    "is_terminated": "terminated",
-    "max_episode_length": "max_episode_steps",
-    "rewards": "reward",
-    "is_truncated": "truncated",
-    "terminations": "terminated",
-    "truncations": "truncated",
-}
-
-
 class Task:
     """The base class of tasks: a subclass defines scene, controls, observation and reward.
 
@@ -187,10 +168,9 @@ class Task:
     """
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Warn of members that other libraries have, which nothing would call here."""
+        """Warn of misspelt members and of those that other libraries have, which nothing would call here."""
         super().__init_subclass__(**options)
-        for name in vars(cls).keys() & _FOREIGN.keys():
-            advice.warn(f"task {cls.__name__}: nothing uses its `{name}`; a Task has `{_FOREIGN[name]}`")
+        tell_of_class(cls, Task)
 
     fields: Sequence[str] = ("joint_q", "joint_qd")
     max_episode_steps: int = 500

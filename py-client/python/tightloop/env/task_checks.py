@@ -11,6 +11,7 @@ import numpy as np
 from tightloop import checks
 from tightloop.attributes import suggestion
 from tightloop.env.task import Task
+from tightloop.env.task_members import tell_of_attributes
 from tightloop.errors import ArgumentError
 from tightloop.launching import launch
 from tightloop.scene import Scene
@@ -50,6 +51,7 @@ def check_task(task: Task) -> None:
         ArgumentError: One is not what `Task` says.
     """
     kind = type(task).__name__
+    tell_of_attributes(task, Task)
     for name, arguments in _CALLS.items():
         _check_call(f"{kind}.{name}", getattr(task, name), arguments)
     fields: Any = task.fields
