@@ -1,6 +1,6 @@
 //! Pictures of meshes, drawn on the processor.
 
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -15,7 +15,7 @@ const SIDE_MAX: usize = 8192;
 /// Keeps meshes and draws them. `tightloop.view.Picture` wraps it, and documents what a picture shows.
 #[pyclass(frozen, module = "tightloop._core")]
 pub(crate) struct Renderer {
-    inner: RwLock<sim_picture::Renderer>,
+    inner: Arc<RwLock<sim_picture::Renderer>>,
     size: [usize; 2],
 }
 
@@ -30,16 +30,19 @@ impl Renderer {
         height: usize,
         threads: Option<usize>,
     ) -> PyResult<Renderer> {
-        for (name, size) in [("width", width), ("height", height)] {
-            if !(1..=SIDE_MAX).contains(&size) {
-                let problem = format!("{name} is {size}; give 1 to {SIDE_MAX} pixels");
-                return Err(raise(py, "ArgumentError", problem));
-            }
-        }
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let inner = sim_picture::Renderer::new(threads.unwrap_or_else(cores));
         Ok(Renderer {
-            inner: RwLock::new(sim_picture::Renderer::new(threads.unwrap_or_else(cores))),
-            size: [width, height],
+            inner: Arc::new(RwLock::new(inner)),
+            size: checked_size(py, width, height)?,
+        })
+    }
+
+    /// For pictures of another size, of the same meshes, which both keep.
+    fn resized(&self, py: Python<'_>, width: usize, height: usize) -> PyResult<Renderer> {
+        Ok(Renderer {
+            inner: self.inner.clone(),
+            size: checked_size(py, width, height)?,
         })
     }
 
@@ -155,6 +158,16 @@ impl Renderer {
     fn read(&self) -> RwLockReadGuard<'_, sim_picture::Renderer> {
         self.inner.read().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn checked_size(py: Python<'_>, width: usize, height: usize) -> PyResult<[usize; 2]> {
+    for (name, size) in [("width", width), ("height", height)] {
+        if !(1..=SIDE_MAX).contains(&size) {
+            let problem = format!("{name} is {size}; give 1 to {SIDE_MAX} pixels");
+            return Err(raise(py, "ArgumentError", problem));
+        }
+    }
+    Ok([width, height])
 }
 
 /// Rows of so many numbers.

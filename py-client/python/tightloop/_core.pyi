@@ -491,6 +491,14 @@ class Renderer:
     """
 
     def __new__(cls, width: int, height: int, threads: int | None = None) -> Renderer: ...
+    def resized(self, width: int, height: int) -> Renderer:
+        """Return a renderer of another size that shares the meshes.
+
+        Args:
+            width: Width of pictures [pixels], at most 8192.
+            height: Height of pictures [pixels], at most 8192.
+        """
+
     def add(
         self, vertices: NDArray[np.float32], faces: NDArray[np.uint32], colors: NDArray[np.uint8], flat: bool = False
     ) -> int:

@@ -90,6 +90,7 @@ class Shown:
             UnknownField: The frame carries no ``body_q``.
             MissingLibrary: The extra ``view`` is not installed.
         """
+        # the meshes stay loaded until the simulation is closed
         given = {"worlds": worlds, "camera": camera, "size": size, "frame": frame}
         return cast("Image", _view("stills").of_simulation(self, **given))
 

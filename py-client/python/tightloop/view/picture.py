@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
@@ -73,10 +74,7 @@ class Picture:
     ) -> None:
         if kind not in ("visual", "collision"):
             raise ArgumentError(f"picture: kind is {kind!r}; give 'visual' or 'collision'")
-        sizes = (("width", width), ("height", height))
-        self.width, self.height = (
-            checks.integer(f"picture: {name}", size, least=16, error=ArgumentError) for name, size in sizes
-        )
+        self.width, self.height = _checked_size(width, height)
         self._renderer = _core.Renderer(self.width, self.height, threads)
         every = list(parts)
         bodies = 1 + max((part.body for part in every), default=-1)
@@ -98,6 +96,23 @@ class Picture:
         self._markers: dict[tuple[float, tuple[int, ...]], int] = {}
         self._stands: dict[tuple[Any, ...], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
         self.offsets: NDArray[np.float32] = np.zeros((0, 3), np.float32)
+
+    def anew(self, width: int, height: int) -> Picture:
+        """Return a `Picture` of another size that shares the meshes, and whose first picture sets the camera again.
+
+        Args:
+            width: Width of pictures [pixels], 16 to 8192.
+            height: Height of pictures [pixels], 16 to 8192.
+
+        Raises:
+            ArgumentError: A size is out of range.
+        """
+        other = copy.copy(self)
+        other.width, other.height = _checked_size(width, height)
+        other._renderer = self._renderer.resized(other.width, other.height)
+        other._cameras, other._stands = {}, {}
+        other.offsets = np.zeros((0, 3), np.float32)
+        return other
 
     def render(
         self,
@@ -317,6 +332,12 @@ class Picture:
                 points = np.concatenate([points, aims[np.isfinite(aims).all(axis=-1)]])
             view = cameras.kept(view, points, aspect=aspect)
         return view
+
+
+def _checked_size(width: int, height: int) -> tuple[int, int]:
+    sizes = (("width", width), ("height", height))
+    width, height = (checks.integer(f"picture: {name}", size, least=16, error=ArgumentError) for name, size in sizes)
+    return width, height
 
 
 def _field(shown: Any, name: str, default: Any = None) -> Any:

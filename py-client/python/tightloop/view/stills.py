@@ -17,6 +17,7 @@ from tightloop.scene import Scene
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_size, check_worlds
 from tightloop.view.cameras import Camera
+from tightloop.view.kept_picture import kept_picture
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture
 
@@ -37,8 +38,7 @@ def of_simulation(
     """Return a picture of worlds of a simulation; see `Sim.picture`."""
     check_worlds("picture", worlds)
     size = check_size("picture", size)
-    info = sim.info
-    picture = Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), *size)
+    picture = kept_picture(sim).anew(*size)
     shown = sim.forward() if frame is None else frame
     if not hasattr(shown, "body_q") and hasattr(shown, "fields"):
         whose = f"simulation `{sim.name}`, whose frames lack it" if frame is None else "frame, which lacks it"
