@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import checks
 from tightloop.attributes import suggestion
 from tightloop.command_arrays import ready_arrays
-from tightloop.errors import ArgumentError, CommandRefused, UnknownField
+from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownField
 from tightloop.frames import FAULTED
 from tightloop.inputs import reals
 from tightloop.launching import launch
@@ -42,6 +42,8 @@ _CONTROLS = ("ctrl", "joint_f", "joint_target_q", "joint_target_qd")
 _STATES = ("joint_q", "joint_qd", "act")
 #: Most worlds of a planner that is launched here.
 _WORLDS = 1024
+#: Most planners that are kept for a simulation: their sizes cover those from 1 to `_WORLDS`, a factor of four each.
+_PLANNERS = 5
 _tangents: weakref.WeakKeyDictionary[Sim, Tangent] = weakref.WeakKeyDictionary()
 
 
@@ -78,8 +80,9 @@ def linearize(
     """Compute the Jacobians of the next control frame of worlds, as ``mjd_transitionFD`` does.
 
     No world of ``sim`` moves. The perturbed states are worlds of a planner: a simulation of the same scene in double
-    precision. The first call launches one, which later calls use and which ends with ``sim``. Differences amplify what
-    the solver leaves: choose a small ``tolerance`` in `Scene.solver` where contacts or limits act.
+    precision. The first call launches one, which later calls of similar size use and which ends with ``sim``.
+    Differences amplify what the solver leaves: choose a small ``tolerance`` in `Scene.solver` where contacts or limits
+    act.
 
     Args:
         sim: The simulation; this client must control it.
@@ -125,15 +128,18 @@ def linearize(
     size = 2 * len(sim.dof_names) + len(sim.activation_names)
     columns = {known["name"]: known["columns"] for known in sim.info["commands"]}[name]
     displaced = _Displaced(size, columns, eps, centered)
-    if planner is None:
-        planner = _planner(sim, fields, count * displaced.rows)
-    else:
+    if planner is not None:
         _check_planner(sim, planner, fields)
     snapshot = sim.snapshot().in_double().of_worlds(chosen)
     if there:
         snapshot = snapshot.of_worlds(np.zeros(count, np.intp))
     labels = [f"state {index}" for index in range(count)] if there else [f"world {world}" for world in chosen]
-    found = _Run(planner, name, given, there, displaced=displaced, sensors=sensors).jacobians(snapshot, labels)
+
+    def jacobians(planner: Sim) -> Linearization:
+        run = _Run(planner, name, given, there, displaced=displaced, sensors=sensors)
+        return run.jacobians(snapshot, labels)
+
+    found = jacobians(planner) if planner is not None else _with_planner(sim, fields, count * displaced.rows, jacobians)
     if there or worlds is None or np.ndim(worlds):
         return found
     a, b, c, d = (None if part is None else part[0] for part in found)
@@ -344,17 +350,39 @@ def _commands(sim: Sim, commands: Any, count: int) -> dict[str, Array]:
     return given
 
 
+def _with_planner(sim: Sim, fields: Sequence[str], samples: int, run: Callable[[Sim], Linearization]) -> Linearization:
+    """Return what a run with a planner of the simulation gives; launch another one if that one was killed."""
+    planner = _planner(sim, fields, samples)
+    try:
+        return run(planner)
+    except DaemonLost:
+        sim._companions.remove(planner)
+        planner.close()
+        return run(_planner(sim, fields, samples))
+
+
 def _planner(sim: Sim, fields: Sequence[str], samples: int) -> Sim:
-    """Return the planner that belongs to a simulation; launch it if there is none with these fields."""
+    """Return a planner that belongs to a simulation; launch one if none has these fields and about as many worlds."""
+    size = min(samples, _WORLDS)
     for kept in [one for one in sim._companions if isinstance(one, Sim)]:
-        if {*fields} <= {*kept.fields} and kept._end.alive:
+        if not ({*fields} <= {*kept.fields} and kept._end.alive):
+            sim._companions.remove(kept)
+            kept.close()
+    planners = [one for one in sim._companions if isinstance(one, Sim)]
+    for kept in planners:
+        # then neither steps nor worlds are more than twice those of a planner of this size
+        if size <= 2 * kept.worlds and kept.worlds <= 2 * size:
+            # the last is the one used last
+            sim._companions.remove(kept)
+            sim._companions.append(kept)
             return kept
-        sim._companions.remove(kept)
-        kept.close()
+    for oldest in planners[: len(planners) + 1 - _PLANNERS]:
+        sim._companions.remove(oldest)
+        oldest.close()
     scene = Scene.from_toml(sim.info["scene"], sim.info["scene_folder"])
     planner = launch(
         scene,
-        worlds=min(samples, _WORLDS),
+        worlds=size,
         device="cpu",
         precision="f64",
         fields=fields,

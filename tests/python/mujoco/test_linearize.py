@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import gymnasium
@@ -214,6 +216,29 @@ def test_the_planner_is_kept_and_ends_with_the_simulation(pendulum):
         assert isinstance(planner, tl.Sim)
     with pytest.raises(tl.SimClosed):
         planner.forward()
+
+
+def test_a_planner_that_was_killed_or_closed_is_launched_anew(pendulum):
+    with tl.launch(pendulum, worlds=3, precision="f64") as sim:
+        first = tl.linearize(sim, 1)
+        for end in (lambda one: os.kill(one.pid, signal.SIGKILL), lambda one: one.close()):
+            (planner,) = sim._companions
+            end(planner)
+            assert np.array_equal(tl.linearize(sim, 1).A, first.A)
+            assert len(sim._companions) == 1 and sim._companions != [planner]
+
+
+def test_planners_are_about_as_large_as_calls_need_and_few(pendulum):
+    with tl.launch(pendulum, worlds=100, precision="f64") as sim:
+        rows = 1 + 2 * 4 + 2 * 2
+        for count in (1, 100, 1, 70, 2, 20):
+            tl.linearize(sim, range(count))
+            needed = min(count * rows, 1024)
+            used = sim._companions[-1]
+            assert isinstance(used, tl.Sim)
+            assert needed / 2 <= used.worlds <= 2 * needed, f"{count} worlds"
+        # those of 1 and 2 worlds share one, and so do those of 70 and 100
+        assert len(sim._companions) == 3
 
 
 def test_a_frame_of_several_substeps_is_linearized_as_one(pendulum):
