@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shlex
+import signal
 import subprocess
 from pathlib import Path
 
@@ -103,6 +104,17 @@ def test_a_step_in_c_takes_memory_only_for_the_loan_of_the_transport(pendulum, t
         done = run(program, sim.name)
     # a step of the client in Rust has this one, too
     assert (done.returncode, done.stdout, done.stderr) == (0, "1\n", "")
+
+
+def test_a_step_in_c_holds_up_no_other_thread_and_no_forked_child(pendulum, tmp_path):
+    program = compiled(REPOSITORY / "tests/python/c_client/threads.c", tmp_path, "-pthread")
+    with tl.launch(pendulum, worlds=3) as sim:
+        sim.release()
+        try:
+            done = run(program, sim.name, str(sim.pid))
+        finally:
+            os.kill(sim.pid, signal.SIGCONT)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_a_frame_in_c_says_when_the_next_one_is_due(pendulum, tmp_path):

@@ -59,7 +59,12 @@ impl State {
         &self,
         send: impl FnOnce(&[Command<'_>]) -> Result<R, ProtocolError>,
     ) -> Result<R, Failure> {
-        Ok(self.staged().take(send)?)
+        self.client.check_process()?;
+        // a step may take long, and other threads may set the inputs of the next one
+        let taken = self.staged().take();
+        let sent = taken.send(send);
+        self.staged().give_back(taken);
+        Ok(sent?)
     }
 }
 
@@ -74,7 +79,10 @@ impl ClientHandle {
 
     /// What is behind it. It stays there for the call, even if another thread detaches.
     pub(crate) fn state(&self) -> Result<Arc<State>, Failure> {
-        self.slot.with(STALE, |state| Ok(Arc::clone(state)))
+        let state = self.slot.with(STALE, |state| Ok(Arc::clone(state)))?;
+        // its locks may be those of threads that a child does not have
+        state.client.check_process()?;
+        Ok(state)
     }
 
     /// Runs while a call waits.
@@ -149,7 +157,8 @@ pub unsafe extern "C" fn tl_describe(
             let output = Output::new(description, Described::EMPTY, "description")?;
             (output, handle(client, "client")?)
         };
-        output.set(client.state()?.description.described());
+        let described = |state: &Arc<State>| Ok(state.description.described());
+        output.set(client.slot.with(STALE, described)?);
         Ok(())
     })
 }

@@ -3,30 +3,67 @@
 //! Their memory is used again and never freed. So a pointer to a client that was detached leads to an empty [`Slot`], which
 //! is an error, or to a newer client, but never to freed memory. It also spares a step its allocation.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
+
+use sim_protocol::Maker;
 
 use crate::status::{Failure, Status};
 
+/// Much longer than any thread has a [`Lock`].
+const MOMENT: Duration = Duration::from_millis(100);
+
+/// A lock for moments. In a forked child, one that a thread of the parent had then is never free.
+#[derive(Debug)]
+struct Lock<T> {
+    value: Mutex<T>,
+    maker: OnceLock<Maker>,
+}
+
+impl<T> Lock<T> {
+    const fn new(value: T) -> Lock<T> {
+        Lock {
+            value: Mutex::new(value),
+            maker: OnceLock::new(),
+        }
+    }
+
+    /// The value; none in a forked child where a thread of the parent had it.
+    fn get(&self) -> Option<MutexGuard<'_, T>> {
+        let maker = self.maker.get_or_init(Maker::this);
+        // a call that panicked leaves a whole value
+        if maker.is_this() {
+            return Some(self.value.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+        let start = Instant::now();
+        loop {
+            match self.value.try_lock() {
+                Ok(value) => return Some(value),
+                Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) if start.elapsed() > MOMENT => return None,
+                Err(TryLockError::WouldBlock) => std::thread::yield_now(),
+            }
+        }
+    }
+}
+
 /// A value that C may have given back.
 #[derive(Debug)]
-pub(crate) struct Slot<T>(Mutex<Option<T>>);
+pub(crate) struct Slot<T>(Lock<Option<T>>);
 
 impl<T> Slot<T> {
     pub(crate) fn empty() -> Slot<T> {
-        Slot(Mutex::new(None))
+        Slot(Lock::new(None))
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<T>> {
-        // a call that panicked leaves a value or none
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
+    /// Fills the slot of a handle that [`Pool::lend`] has just given.
     pub(crate) fn fill(&self, value: T) {
-        *self.lock() = Some(value);
+        let mut slot = self.0.get().expect("nobody else has a handle of the pool");
+        *slot = Some(value);
     }
 
     pub(crate) fn take(&self) -> Option<T> {
-        self.lock().take()
+        self.0.get()?.take()
     }
 
     /// Looks at the value; an error where it was given back.
@@ -35,35 +72,38 @@ impl<T> Slot<T> {
         stale: &str,
         look: impl FnOnce(&T) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        match &*self.lock() {
-            Some(value) => look(value),
-            None => Err(Failure::new(Status::StaleHandle, stale)),
+        match self.0.get().as_deref() {
+            Some(Some(value)) => look(value),
+            Some(None) => Err(Failure::new(Status::StaleHandle, stale)),
+            None => {
+                let sentence = "this process was forked while a thread of its parent used this handle; \
+                                attach in the child";
+                Err(Failure::new(Status::Forked, sentence))
+            }
         }
     }
 }
 
 /// Handles that nobody uses at present.
 #[derive(Debug)]
-pub(crate) struct Pool<H: 'static>(Mutex<Vec<&'static H>>);
+pub(crate) struct Pool<H: 'static>(Lock<Vec<&'static H>>);
 
 impl<H> Pool<H> {
     pub(crate) const fn new() -> Pool<H> {
-        Pool(Mutex::new(Vec::new()))
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<&'static H>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        Pool(Lock::new(Vec::new()))
     }
 
     /// A handle whose slot is empty.
     pub(crate) fn lend(&self, make: impl FnOnce() -> H) -> &'static H {
-        let unused = self.lock().pop();
+        let unused = self.0.get().and_then(|mut unused| unused.pop());
         unused.unwrap_or_else(|| Box::leak(Box::new(make())))
     }
 
     /// Takes a handle whose slot the caller has emptied.
     pub(crate) fn give_back(&self, handle: &'static H) {
-        self.lock().push(handle);
+        if let Some(mut unused) = self.0.get() {
+            unused.push(handle);
+        }
     }
 }
 

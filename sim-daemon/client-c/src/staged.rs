@@ -9,8 +9,14 @@ const FEW: usize = 8;
 #[derive(Debug)]
 pub(crate) struct Staged {
     inputs: Vec<Input>,
+    /// Another set of them, unset, for when the first is on its way.
+    spare: Option<Vec<Input>>,
     worlds: usize,
 }
+
+/// Inputs on their way.
+#[derive(Debug)]
+pub(crate) struct Taken(Vec<Input>);
 
 #[derive(Debug)]
 struct Input {
@@ -40,6 +46,7 @@ impl Staged {
         };
         Staged {
             inputs: description.commands.iter().map(input).collect(),
+            spare: None,
             worlds: description.worlds,
         }
     }
@@ -81,21 +88,33 @@ impl Staged {
         Ok(())
     }
 
-    /// Hands over what was set, and unsets it, whatever becomes of it.
-    pub(crate) fn take<R>(&mut self, send: impl FnOnce(&[Command<'_>]) -> R) -> R {
-        let count = self.inputs.iter().filter(|input| input.is != Is::Unset);
-        let count = count.count();
-        let mut set = self.inputs.iter().filter_map(Input::command);
-        let result = if count <= FEW {
+    /// Hands over what was set, and unsets it, whatever becomes of it. Others may be set meanwhile.
+    pub(crate) fn take(&mut self) -> Taken {
+        let empty = |inputs: &[Input]| inputs.iter().map(Input::empty).collect();
+        let next = self.spare.take().unwrap_or_else(|| empty(&self.inputs));
+        Taken(std::mem::replace(&mut self.inputs, next))
+    }
+
+    /// Takes back the memory of what was sent.
+    pub(crate) fn give_back(&mut self, mut taken: Taken) {
+        for input in &mut taken.0 {
+            input.is = Is::Unset;
+        }
+        self.spare = Some(taken.0);
+    }
+}
+
+impl Taken {
+    /// Sends what was set.
+    pub(crate) fn send<R>(&self, send: impl FnOnce(&[Command<'_>]) -> R) -> R {
+        let count = self.0.iter().filter(|input| input.is != Is::Unset).count();
+        let mut set = self.0.iter().filter_map(Input::command);
+        if count <= FEW {
             let few: [Command<'_>; FEW] = std::array::from_fn(|_| set.next().unwrap_or(NONE));
             send(&few[..count])
         } else {
             send(&set.collect::<Vec<_>>())
-        };
-        self.inputs
-            .iter_mut()
-            .for_each(|input| input.is = Is::Unset);
-        result
+        }
     }
 }
 
@@ -106,6 +125,16 @@ const NONE: Command<'static> = Command {
 };
 
 impl Input {
+    fn empty(&self) -> Input {
+        Input {
+            name: self.name.clone(),
+            columns: self.columns,
+            is: Is::Unset,
+            single: Vec::new(),
+            double: Vec::new(),
+        }
+    }
+
     fn command(&self) -> Option<Command<'_>> {
         let values = match self.is {
             Is::Unset => return None,
@@ -134,6 +163,7 @@ mod tests {
         };
         Staged {
             inputs: (0..inputs).map(input).collect(),
+            spare: None,
             worlds: 3,
         }
     }
@@ -143,7 +173,26 @@ mod tests {
             let name = |command: &Command<'_>| (command.field.to_owned(), command.values.len());
             commands.iter().map(name).collect()
         };
-        staged.take(names)
+        let taken = staged.take();
+        let sent = taken.send(names);
+        staged.give_back(taken);
+        sent
+    }
+
+    #[test]
+    fn what_is_set_while_a_step_is_on_its_way_is_for_the_next_one() {
+        let mut staged = staged(2);
+        staged.set("input0", Values::F32(&[1.0; 6])).unwrap();
+        let taken = staged.take();
+        staged.set("input1", Values::F64(&[2.0; 6])).unwrap();
+        let names = |commands: &[Command<'_>]| {
+            let names = commands.iter().map(|command| command.field.to_owned());
+            names.collect::<Vec<_>>()
+        };
+        assert_eq!(taken.send(names), ["input0"]);
+        staged.give_back(taken);
+        assert_eq!(sent(&mut staged), [("input1".to_owned(), 6)]);
+        assert_eq!(sent(&mut staged), []);
     }
 
     #[test]

@@ -129,25 +129,27 @@ impl Client {
     /// Process that holds the lease, if any.
     ///
     /// # Errors
-    /// [`ProtocolError::DaemonLost`] and its kin.
+    /// [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::Forked`].
     pub fn controller(&self, hook: Hook<'_>) -> Result<Option<u32>, ProtocolError> {
+        self.check_process()?;
         match self.connection.ask(&Request::Controller, hook)? {
             Response::Controller { pid } => Ok(pid),
             _ => Err(malformed("the answer to controller")),
         }
     }
 
-    /// Whether this client holds the lease, as far as it knows.
+    /// Whether this client holds the lease, as far as it knows. In a forked child it does not.
     pub fn holds_lease(&self) -> bool {
         // a call that has it takes the lease, or uses it
-        self.controller.look(Option::is_some).unwrap_or(true)
+        self.maker.is_this() && self.controller.look(Option::is_some).unwrap_or(true)
     }
 
     /// How frames kept their pace since the daemon started, or since somebody counted anew, as `clear` does.
     ///
     /// # Errors
-    /// [`ProtocolError::DaemonLost`] and its kin.
+    /// [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::Forked`].
     pub fn timing(&self, clear: bool, hook: Hook<'_>) -> Result<Timing, ProtocolError> {
+        self.check_process()?;
         match self.connection.ask(&Request::Timing { clear }, hook)? {
             Response::Timing(timing) => Ok(timing),
             _ => Err(malformed("the answer to timing")),
@@ -164,8 +166,12 @@ impl Client {
         self.with_controller(hook, |_, _| Ok(()))
     }
 
-    /// The ports belong to the process that opened them.
-    fn check_process(&self) -> Result<(), ProtocolError> {
+    /// Refuses a forked child: the ports belong to the process that opened them. A thread that had a turn or a lock is not in
+    /// the child, so a call asks this before it waits for either.
+    ///
+    /// # Errors
+    /// [`ProtocolError::Forked`].
+    pub fn check_process(&self) -> Result<(), ProtocolError> {
         if self.maker.is_this() {
             return Ok(());
         }
@@ -181,8 +187,9 @@ impl Client {
     /// it takes effect when the call that waits returns.
     ///
     /// # Errors
-    /// [`ProtocolError::Interrupted`] while it waits for the call of another thread.
+    /// [`ProtocolError::Interrupted`] while it waits for the call of another thread; [`ProtocolError::Forked`].
     pub fn release(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
+        self.check_process()?;
         match self.controller.take(hook) {
             Ok(mut held) => drop(held.take()), // dropping it releases
             Err(ProtocolError::CallInProgress) => self.release.store(true, Ordering::Relaxed),
@@ -466,7 +473,7 @@ impl Client {
     /// Ends the daemon, with all of its groups, and returns when it is gone and has left nothing behind.
     ///
     /// # Errors
-    /// [`ProtocolError::Timeout`], [`ProtocolError::Interrupted`].
+    /// [`ProtocolError::Timeout`], [`ProtocolError::Interrupted`], [`ProtocolError::Forked`].
     pub fn shutdown(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         self.release(hook)?;
         self.observer.take(hook)?.take();

@@ -4,14 +4,15 @@ use sim_system::forks;
 
 /// The process in which something was made.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Maker {
+pub struct Maker {
     pid: u32,
     forks: u32,
 }
 
 impl Maker {
     /// This process.
-    pub(crate) fn this() -> Maker {
+    #[must_use]
+    pub fn this() -> Maker {
         forks::start_to_count();
         Maker {
             pid: std::process::id(),
@@ -20,12 +21,12 @@ impl Maker {
     }
 
     /// Whether this process is the one, and not a fork of it.
-    pub(crate) fn is_this(self) -> bool {
+    pub fn is_this(self) -> bool {
         forks::count_so_far() == self.forks
     }
 
     /// Its number.
-    pub(crate) fn pid(self) -> u32 {
+    pub fn pid(self) -> u32 {
         self.pid
     }
 }

@@ -81,6 +81,7 @@ pub use description::{
 pub use device_memory::{Delivery, Descriptor, DeviceCommand, DeviceMemory};
 pub use discovery::{AttachOptions, find};
 pub use error::ProtocolError;
+pub use forked::Maker;
 pub use frame::{Entry, Frame, View};
 pub use header::{
     ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
