@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tightloop as tl
+from conftest import URDF
+from processes import started
 
 TOP = [sys.executable, "-m", "tightloop", "top"]
 FRAMES = 10
@@ -93,6 +101,115 @@ def test_prometheus_scrapes_loopback(sim: tl.Sim) -> None:
     assert values[f'tightloop_faulted_worlds{{daemon="{sim.name}"}}'] == "1"
     known = {line.split()[2] for line in text.splitlines() if line.startswith("# TYPE")}
     assert {name.split("{")[0] for name in values} == known
+
+
+@contextmanager
+def scraped(name: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A server of scrapes, and its port."""
+    command = [*TOP, name, "--metrics", "127.0.0.1:0"]
+    with started(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as top:
+        assert top.stdout is not None
+        yield top, int(top.stdout.readline().split(":")[2].split("/")[0])
+
+
+def answer(port: int, request: bytes) -> bytes:
+    """Return all that the server says to these bytes, until it closes."""
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
+        connection.sendall(request)
+        told = b""
+        with contextlib.suppress(ConnectionResetError):
+            while some := connection.recv(65536):
+                told += some
+    return told
+
+
+def status(port: int, *lines: str) -> int:
+    """Return the status of the answer to a request of these lines."""
+    told = answer(port, "\r\n".join([*lines, "", ""]).encode())
+    return int(told.split()[1])
+
+
+def resident(pid: int) -> int:
+    """Return the memory of a process [bytes]."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.parametrize("more", ["Content-Length: 100000000000000", "Content-Length: 5", "Transfer-Encoding: chunked"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_a_request_with_a_body_is_refused_and_the_next_one_served(sim: tl.Sim, method: str, more: str) -> None:
+    with scraped(sim.name) as (_, port):
+        refused = status(port, f"{method} /metrics HTTP/1.1", "Host: localhost", more)
+        assert refused == (413 if method == "GET" else 405)
+        assert status(port, "GET /metrics HTTP/1.1", "Host: localhost") == 200
+
+
+def test_open_connections_that_say_nothing_keep_no_scrape_out(sim: tl.Sim) -> None:
+    with scraped(sim.name) as (_, port), contextlib.ExitStack() as silent:
+        for _ in range(200):
+            connection = socket.create_connection(("127.0.0.1", port), timeout=20)
+            silent.enter_context(connection).sendall(b"GET /metrics HTTP/1.1\r\nHost: local")
+        began = time.monotonic()
+        assert status(port, "GET /metrics HTTP/1.1", "Host: localhost") == 200
+        assert time.monotonic() - began < 2.0
+
+
+def test_a_head_without_end_takes_little_memory_and_little_time(sim: tl.Sim) -> None:
+    with scraped(sim.name) as (top, port):
+        before, began = resident(top.pid), time.monotonic()
+        with (
+            socket.create_connection(("127.0.0.1", port), timeout=20) as connection,
+            pytest.raises(ConnectionError),
+        ):
+            while time.monotonic() - began < 20.0:
+                connection.sendall(b"X-Header: " + b"a" * 65536 + b"\r\n")
+        assert time.monotonic() - began < 10.0
+        assert resident(top.pid) - before < 8e6
+        assert status(port, "GET /metrics HTTP/1.1", "Host: localhost") == 200
+
+
+def test_a_head_that_comes_byte_by_byte_is_not_waited_for(sim: tl.Sim) -> None:
+    with scraped(sim.name) as (_, port):
+        began = time.monotonic()
+        with (
+            socket.create_connection(("127.0.0.1", port), timeout=20) as connection,
+            pytest.raises(ConnectionError),
+        ):
+            while time.monotonic() - began < 20.0:
+                connection.sendall(b"G")
+                time.sleep(0.1)
+        assert time.monotonic() - began < 10.0
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "attacker.example",
+        "attacker.example:9400",
+        "localhost.attacker.example",
+        "127.0.0.1@attacker.example",
+        "a b",
+        "",
+    ],
+)
+def test_a_host_that_is_not_this_machine_gets_no_answer(sim: tl.Sim, host: str) -> None:
+    with scraped(sim.name) as (_, port):
+        assert status(port, "GET /metrics HTTP/1.1", f"Host: {host}") in (400, 421)
+        assert status(port, "GET /metrics HTTP/1.1") in (400, 421)
+        assert status(port, "GET /metrics HTTP/1.1", "Host: localhost", f"Host: {host}") in (400, 421)
+        for ours in ("localhost", f"localhost:{port}", f"127.0.0.1:{port}", "LOCALHOST", "[::1]:1"):
+            assert status(port, "GET /metrics HTTP/1.1", f"Host: {ours}") == 200
+
+
+def test_a_scrape_while_a_daemon_steps_is_told_so(unique: Callable[[], str]) -> None:
+    name = unique()
+    scene = tl.Scene(dt=1e-4, substeps=10_000_000)
+    scene.add_urdf(URDF, name="arm")
+    with tl.launch(scene, worlds=1, device="cpu", threads=1, name=name) as sim, scraped(name) as (top, port):
+        sim.send()
+        time.sleep(0.3)
+        told = answer(port, b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert told.startswith(b"HTTP/1.1 503") and b"long work" in told
+        assert top.poll() is None
 
 
 @pytest.mark.parametrize(

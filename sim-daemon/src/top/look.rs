@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use sim_physics::arrays::status::FROZEN;
-use sim_protocol::{AttachOptions, Client, Description, ProtocolError, Timing, keep_waiting};
+use sim_protocol::{AttachOptions, Client, Description, Hook, ProtocolError, Timing, keep_waiting};
 use sim_system::process;
 
 /// A daemon that is watched.
@@ -74,7 +74,7 @@ impl Watched {
             before: Vec::new(),
             groups,
         };
-        watched.look()?;
+        watched.look(&mut keep_waiting())?;
         Ok(watched)
     }
 
@@ -82,8 +82,7 @@ impl Watched {
         self.groups[0].description()
     }
 
-    pub(super) fn look(&mut self) -> Result<Look, ProtocolError> {
-        let hook = &mut keep_waiting();
+    pub(super) fn look(&mut self, hook: Hook<'_>) -> Result<Look, ProtocolError> {
         let (mut controllers, mut observers, mut timing) = (Vec::new(), 0, Vec::new());
         let mut after = Vec::new();
         for (group, seen) in self.groups.iter().zip(&mut self.seen) {

@@ -1,63 +1,15 @@
-//! A look in the text format of Prometheus, over HTTP on the loopback interface.
+//! A look in the text format of Prometheus.
 //! <https://prometheus.io/docs/instrumenting/exposition_formats/>
 
 use std::fmt::Write;
-use std::net::{SocketAddr, ToSocketAddrs};
 
-use tiny_http::{Header, Method, Response, Server};
-
-use super::look::{Look, Watched};
+use super::look::Look;
 use super::page::percentiles;
-use crate::error::DaemonError;
-use crate::output;
-
-/// Answers scrapes until the daemon ends.
-///
-/// # Errors
-/// An address that is not of this machine alone, or is taken; the end of the daemon.
-pub(super) fn serve(address: &str, watched: &mut Watched) -> Result<(), DaemonError> {
-    let wrong = |problem: String| DaemonError::Argument {
-        argument: "metrics",
-        value: address.to_owned(),
-        problem,
-    };
-    let addresses: Vec<SocketAddr> = address
-        .to_socket_addrs()
-        .map_err(|error| wrong(format!("{error}; give an address such as 127.0.0.1:9400")))?
-        .collect();
-    if let Some(other) = addresses.iter().find(|each| !each.ip().is_loopback()) {
-        let problem = format!(
-            "others would reach {other}; give 127.0.0.1, and let a proxy with access rules pass it on"
-        );
-        return Err(wrong(problem));
-    }
-    let server = Server::http(&addresses[..])
-        .map_err(|error| wrong(format!("{error}; give a port that is free")))?;
-    let place = server.server_addr();
-    output::print(format!("http://{place}/metrics\n").as_bytes()).map_err(DaemonError::stdout)?;
-    for request in server.incoming_requests() {
-        let is_known = matches!(request.url(), "/" | "/metrics");
-        let response = match (request.method(), is_known) {
-            (Method::Get, true) => {
-                let kind = Header::from_bytes("Content-Type", "text/plain; version=0.0.4")
-                    .expect("it is ASCII");
-                Response::from_string(text(&watched.look()?)).with_header(kind)
-            }
-            (Method::Get, false) => {
-                Response::from_string("ask for /metrics\n").with_status_code(404)
-            }
-            _ => Response::from_string("GET only\n").with_status_code(405),
-        };
-        // who asked may be gone
-        let _ = request.respond(response);
-    }
-    Ok(())
-}
 
 /// A name of a metric without `tightloop_`, its help, its type, and its values.
 type Metric = (&'static str, &'static str, &'static str, Vec<(String, f64)>);
 
-fn text(look: &Look) -> String {
+pub(super) fn text(look: &Look) -> String {
     let all = |value: f64| vec![(String::new(), value)];
     let groups = |of: &dyn Fn(&sim_protocol::Timing) -> u64| {
         let timing = look.timing.iter().enumerate();

@@ -1,11 +1,14 @@
 //! `tightloop top`: what a daemon does now, on a terminal, as JSON, or for Prometheus.
 
+mod http;
 mod look;
 mod metrics;
 mod page;
 
 use std::io::{IsTerminal, stdout};
 use std::time::Duration;
+
+use sim_protocol::keep_waiting;
 
 use self::look::Watched;
 use crate::cli::Top;
@@ -28,13 +31,13 @@ pub(crate) fn run(top: &Top) -> Result<(), DaemonError> {
     }
     let mut watched = Watched::attach(&top.name)?;
     if let Some(address) = &top.metrics {
-        return metrics::serve(address, &mut watched);
+        return http::serve(address, watched);
     }
     let is_live = stdout().is_terminal() && !top.json && top.count != Some(1);
     let mut shown = 0;
     while top.count.is_none_or(|count| shown < count) {
         std::thread::sleep(Duration::from_secs_f64(top.interval));
-        let look = watched.look()?;
+        let look = watched.look(&mut keep_waiting())?;
         let text = match (top.json, is_live) {
             (true, _) => format!("{}\n", page::json(&look)),
             (false, true) => format!("{CLEAR}{}", page::text(&look)),
