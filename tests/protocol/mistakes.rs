@@ -216,19 +216,36 @@ fn another_protocol_version_is_refused_with_both_named() {
 }
 
 #[test]
-fn a_client_too_many_is_told_the_limit_and_may_come_when_another_goes() {
+fn observers_keep_no_controller_out_and_one_too_many_is_told_the_limit() {
     let daemon = Daemon::start("many", &[]);
-    let mut clients: Vec<_> = (0..32).map(|_| daemon.attach()).collect();
+    let mut observers: Vec<_> = (0..32).map(|_| daemon.attach()).collect();
+    for observer in &observers {
+        observer.latest(&mut keep_waiting()).unwrap();
+    }
+    let other = daemon.attach();
+    let error = other.latest(&mut keep_waiting()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "daemon {:?} has 32 observers, which is the limit; close one of them",
+            daemon.name
+        )
+    );
+    // whoever may not observe may still command
+    reset(&other);
+    observers.truncate(31);
+    daemon.attach().latest(&mut keep_waiting()).unwrap();
+}
+
+#[test]
+fn a_client_too_many_is_told_the_limit_and_may_come_when_another_goes() {
+    let daemon = Daemon::start("more", &[]);
+    let mut clients: Vec<_> = (0..64).map(|_| daemon.attach()).collect();
     let error = attach(&daemon.name).unwrap_err();
     assert!(
-        matches!(error, ProtocolError::TooManyClients { max: 32, .. }),
+        matches!(error, ProtocolError::TooManyClients { max: 64, .. }),
         "{error}"
     );
-    assert!(
-        clients
-            .iter()
-            .all(|client| client.latest(&mut keep_waiting()).is_ok())
-    );
-    clients.truncate(31);
+    clients.truncate(63);
     reset(&daemon.attach());
 }

@@ -335,7 +335,7 @@ fn open_lease(
     let ports = connection.with_node(|node| {
         let service = transport::open_frames(node, epoch)?;
         let event = transport::open_event(node, &format!("obs/{epoch}"))?;
-        let subscriber = transport::frame_subscriber(&service, 0)?;
+        let subscriber = transport::frame_subscriber(&service)?;
         let listener = transport::listener(&event)?;
         // last: the daemon counts the lease as used once it sees this
         let commands = transport::open_commands(node, epoch)?;

@@ -218,10 +218,12 @@ pub enum ProtocolError {
     },
 
     /// As many clients are attached as there is room for.
-    #[error("daemon {name:?} has {max} clients, which is the limit; close one of them")]
+    #[error("daemon {name:?} has {max} {what}, which is the limit; close one of them")]
     TooManyClients {
         /// The daemon's name.
         name: String,
+        /// Clients or observers.
+        what: &'static str,
         /// The limit.
         max: usize,
     },

@@ -34,10 +34,8 @@ impl Observer {
     ) -> Result<Observer, ProtocolError> {
         let (subscriber, listener) = connection.ports(hook, |node| {
             let listener = transport::listener(&transport::open_event(node, "watch")?)?;
-            Ok((
-                transport::frame_subscriber(&transport::open_watch(node)?, 1)?,
-                listener,
-            ))
+            let name = connection.peer.paths.name();
+            Ok((transport::watch_subscriber(node, name)?, listener))
         })?;
         // a daemon that sleeps shows a new observer its present state when it looks around
         connection.notify();

@@ -12,7 +12,7 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::server::Server;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
@@ -22,8 +22,10 @@ use crate::port::Port;
 use crate::problem::{self, Problem};
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
-/// Clients that may be attached at once, controllers and observers together.
-pub(crate) const CLIENTS_MAX: usize = 32;
+/// Clients that may observe at once.
+pub(crate) const OBSERVERS_MAX: usize = 32;
+/// Clients that may be attached at once: as many again as observers, so that these never keep a controller or a tool out.
+const CLIENTS_MAX: usize = 2 * OBSERVERS_MAX;
 /// Control requests of one client that may be unread: two heartbeats, a release, and one that is waited for.
 const CONTROL_ACTIVE: usize = 4;
 /// Shared memory of a client without its commands, rounded up [bytes].
@@ -127,7 +129,7 @@ pub(crate) fn frame_slots(frames_held: usize) -> usize {
 
 /// Number of frame slots that the observers' service has.
 pub(crate) fn watch_slots(frames_held: usize) -> usize {
-    CLIENTS_MAX * (BUFFER + borrowed(frames_held)) + 1 + LOANS
+    OBSERVERS_MAX * (BUFFER + borrowed(frames_held)) + 1 + LOANS
 }
 
 /// Number of command slots of a lease.
@@ -223,7 +225,7 @@ pub(crate) fn create_watch<S: Service>(
         .subscriber_max_borrowed_samples(borrowed(frames_held))
         .history_size(1)
         .max_publishers(1)
-        .max_subscribers(CLIENTS_MAX)
+        .max_subscribers(OBSERVERS_MAX)
         .max_nodes(CLIENTS_MAX + 1)
         .create()
         .map(|service| Port::new(node.config(), service))
@@ -248,15 +250,14 @@ pub(crate) fn frame_publisher<S: Service>(
     publisher(service, bytes / ALIGNMENT, "frame")
 }
 
-/// The end of a service of frames that receives; `history` is 1 for observers, who want the newest frame at once.
+/// The end of a service of frames that receives.
 pub(crate) fn frame_subscriber<S: Service>(
     service: &FrameService<S>,
-    history: usize,
 ) -> Result<FrameSubscriber<S>, ProtocolError> {
     service
         .subscriber_builder()
         .buffer_size(BUFFER)
-        .history_request(history)
+        .history_request(0)
         .create()
         .map(|port| Port::of(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
@@ -276,6 +277,31 @@ pub(crate) fn open_commands<S: Service>(
     epoch: u64,
 ) -> Result<CommandService<S>, ProtocolError> {
     open_lines(node, &format!("act/{epoch}"))
+}
+
+/// The end of the observers' service that receives; the daemon's name is for the error when there are too many of them.
+pub(crate) fn watch_subscriber<S: Service>(
+    node: &Node<S>,
+    name: &str,
+) -> Result<FrameSubscriber<S>, ProtocolError> {
+    let service = open_watch(node)?;
+    let subscriber = service
+        .subscriber_builder()
+        .buffer_size(BUFFER)
+        // the newest frame at once
+        .history_request(1)
+        .create();
+    match subscriber {
+        Ok(port) => Ok(Port::of(service.owner(), port)),
+        Err(SubscriberCreateError::ExceedsMaxSupportedSubscribers) => {
+            Err(ProtocolError::TooManyClients {
+                name: name.to_owned(),
+                what: "observers",
+                max: OBSERVERS_MAX,
+            })
+        }
+        Err(error) => Err(ProtocolError::transport("create a frame subscriber", error)),
+    }
 }
 
 /// The end of a service of commands that sends.
@@ -388,6 +414,7 @@ pub(crate) fn open_wake<S: Service>(
     service.map_err(|error| match error {
         EventOpenError::ExceedsMaxNumberOfNodes => ProtocolError::TooManyClients {
             name: name.to_owned(),
+            what: "clients",
             max: CLIENTS_MAX,
         },
         error => ProtocolError::transport("open event wake", error),
