@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::io::Write;
 
-use sim_protocol::{AttachOptions, Client, keep_waiting};
+use sim_protocol::{AttachOptions, keep_waiting};
 use sim_system::signals;
 
 use crate::cli::{self, CliCommand};
@@ -44,13 +44,6 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
 }
 
 fn stop(name: &str) -> Result<(), DaemonError> {
-    let options = AttachOptions::default();
-    // any of its groups ends a daemon
-    let name = match sim_protocol::find(name, &options, &mut keep_waiting())?.groups {
-        1 => name.to_owned(),
-        _ => format!("{name}.0"),
-    };
-    let client = Client::attach(&name, &options, &mut keep_waiting())?;
-    client.shutdown(&mut keep_waiting())?;
+    sim_protocol::stop(name, &AttachOptions::default(), &mut keep_waiting())?;
     Ok(())
 }

@@ -18,6 +18,7 @@ mod fault_log;
 mod groups;
 mod ik;
 mod inspect;
+mod janitor;
 mod list;
 mod log;
 pub mod observe;

@@ -17,8 +17,8 @@ use crate::error::DaemonError;
 
 /// Messages that wait at most [–]: the notes of a large scene come at once.
 const QUEUE: usize = 1024;
-/// Longest wait for messages to be written, less than launchers wait for our end before they kill.
-const FLUSH_MAX: Duration = Duration::from_secs(2);
+/// Longest wait for messages to be written. An end has two of them, and the watchdog does not wait longer.
+const FLUSH_MAX: Duration = Duration::from_millis(300);
 /// A full queue is tried again this often while somebody waits for its end.
 const RETRY: Duration = Duration::from_millis(1);
 
@@ -97,7 +97,12 @@ impl Printer {
 
 /// Waits until everything handed over is written, or until that takes too long.
 pub(crate) fn flush<'a>(printers: impl IntoIterator<Item = &'a Printer>) {
-    let deadline = Instant::now() + FLUSH_MAX;
+    flush_within(FLUSH_MAX, printers);
+}
+
+/// The same with a limit of its own.
+pub(crate) fn flush_within<'a>(limit: Duration, printers: impl IntoIterator<Item = &'a Printer>) {
+    let deadline = Instant::now() + limit;
     printers
         .into_iter()
         .for_each(|printer| printer.flush(deadline));

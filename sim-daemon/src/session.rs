@@ -2,7 +2,6 @@
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
@@ -16,7 +15,6 @@ use sim_protocol::descriptors::make_room_for;
 use sim_protocol::host::{Host, check_memory};
 use sim_protocol::paths::DaemonPaths;
 use sim_protocol::{Description, ProtocolError, Table};
-use sim_system::signals;
 
 use crate::advice::advice;
 use crate::cli::Serve;
@@ -24,6 +22,7 @@ use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 use crate::groups;
+use crate::janitor::Janitor;
 use crate::log::{Log, Streams};
 use crate::pace;
 use crate::server;
@@ -42,7 +41,8 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
         let _ = writeln!(std::io::stderr(), "tightloop: {error}");
     })?;
     let mut was_ready = false;
-    let result = run_with(serve, &streams, &mut was_ready);
+    let result = Watchdog::start(serve, &streams.stderr)
+        .and_then(|watchdog| run_with(serve, &streams, &watchdog, &mut was_ready));
     if let Err(error) = &result {
         if !was_ready {
             announce_error(error, &streams);
@@ -54,19 +54,19 @@ pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     result
 }
 
-fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<(), DaemonError> {
+fn run_with(
+    serve: &Serve,
+    streams: &Streams,
+    watchdog: &Watchdog,
+    was_ready: &mut bool,
+) -> Result<(), DaemonError> {
     let log = Log::open(
         serve.log.as_deref(),
         serve.parent.is_some(),
         &streams.stderr,
     )?;
-    // from here on, a request to stop is carried out as soon as that is clean
-    let stop = Arc::new(AtomicBool::new(false));
-    signals::on_stop(&stop).map_err(|error| DaemonError::System {
-        action: "handle signals",
-        problem: error.to_string(),
-    })?;
-    let Opened { daemon, groups } = open(serve)?;
+    let stop = watchdog.stop();
+    let Opened { daemon, groups } = open(serve, watchdog)?;
     let door = Mutex::new(Door {
         daemon,
         closed: groups.len(),
@@ -76,7 +76,7 @@ fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<()
         log: log.clone(),
         streams,
     });
-    let result = groups::serve_all(groups, &stop, |number, group: Group| {
+    let result = groups::serve_all(groups, stop, |number, group: Group| {
         let log = match group.announced.groups {
             1 => log.clone(),
             _ => log.for_group(number),
@@ -85,17 +85,17 @@ fn run_with(serve: &Serve, streams: &Streams, was_ready: &mut bool) -> Result<()
             group.daemon_lock,
             group.announced,
             group.table,
-            Arc::clone(&stop),
+            Arc::clone(stop),
         )?;
         // again with the memory of the services; what is refused was said above
         let _ = pace::lock_memory(serve);
-        let watchdog = Watchdog::start(Arc::clone(&stop), serve.parent, host.client_cleanup())?;
+        let janitor = Janitor::start(host.client_cleanup())?;
         door.lock()
             .unwrap_or_else(PoisonError::into_inner)
             .open(&host)?;
         let result = server::run(group.simulation, &mut host, &log);
         // its cleanup must not read the shared folder while the host removes it
-        drop(watchdog);
+        drop(janitor);
         result
     });
     let door = door.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -198,7 +198,7 @@ impl Door<'_> {
 }
 
 /// Everything before the first client may come, except the services.
-fn open(serve: &Serve) -> Result<Opened, DaemonError> {
+fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     // of each group
     let options = check(serve)?;
     let refusals = pace::ask_system(serve)?;
@@ -220,10 +220,16 @@ fn open(serve: &Serve) -> Result<Opened, DaemonError> {
     make_room_for(count)?;
     sim_protocol::sweep(None)?;
     let daemon_lock = DaemonLock::take(&paths)?;
+    watchdog.keep(&paths);
     let (daemon, locks) = match count {
         1 => (None, vec![daemon_lock]),
         _ => {
-            let taken = (0..count).map(|group| DaemonLock::take(&paths.group(group)?));
+            let taken = (0..count).map(|group| {
+                let paths = paths.group(group)?;
+                let daemon_lock = DaemonLock::take(&paths)?;
+                watchdog.keep(&paths);
+                Ok::<_, ProtocolError>(daemon_lock)
+            });
             (Some(daemon_lock), taken.collect::<Result<Vec<_>, _>>()?)
         }
     };

@@ -202,9 +202,9 @@ def test_a_host_that_is_not_this_machine_gets_no_answer(sim: tl.Sim, host: str) 
 
 def test_a_scrape_while_a_daemon_steps_is_told_so(unique: Callable[[], str]) -> None:
     name = unique()
-    scene = tl.Scene(dt=1e-4, substeps=10_000_000)
+    scene = tl.Scene(dt=1e-4, substeps=10_000)
     scene.add_urdf(URDF, name="arm")
-    with tl.launch(scene, worlds=1, device="cpu", threads=1, name=name) as sim, scraped(name) as (top, port):
+    with tl.launch(scene, worlds=20_000, device="cpu", threads=1, name=name) as sim, scraped(name) as (top, port):
         sim.send()
         time.sleep(0.3)
         told = answer(port, b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n")

@@ -77,7 +77,7 @@ pub use module::translated;
 pub use program::Program;
 pub use run::lose_after;
 pub use shared::{Descriptor, Moment, SharedBuffer, Timeline};
-pub use software::leave;
+pub use software::{leave, leave_at_once};
 pub use source::Source;
 #[doc(hidden)]
 pub use workers::compiling;

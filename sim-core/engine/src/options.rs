@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use std::time::{Duration, UNIX_EPOCH};
 
 pub use crate::backend::gpu::Cuts;
-pub use sim_device::{AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave};
+pub use sim_device::{
+    AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave, leave_at_once,
+};
 #[doc(hidden)]
 pub use sim_device::{compiling, lose_after, open_as_discrete};
 

@@ -21,6 +21,9 @@ use crate::transport;
 use crate::turn::{Held, Turn};
 use crate::{Description, Frame, Op, ProtocolError, Timing};
 
+/// How long a client that attaches waits for the daemon's word.
+const DESCRIBED_MAX: Duration = Duration::from_millis(500);
+
 /// A connection to a daemon. All methods take `&self`, from any thread; calls that step wait for each other.
 ///
 /// ```no_run
@@ -80,9 +83,12 @@ impl Client {
     fn handshake(peer: Peer, hook: Hook<'_>) -> Result<Client, ProtocolError> {
         let name = peer.paths.name().to_owned();
         let (connection, announced) = Connection::open(&peer, hook)?;
-        let Response::Described = connection.ask(&Request::Describe, hook)? else {
-            return Err(malformed("the answer to describe"));
-        };
+        // a daemon at long work answers later, and has written its description before
+        match connection.ask_within(DESCRIBED_MAX, &Request::Describe, hook) {
+            Ok(Response::Described) | Err(ProtocolError::Timeout { .. }) => {}
+            Ok(_) => return Err(malformed("the answer to describe")),
+            Err(error) => return Err(error),
+        }
         let description = described::read(&connection.peer.paths, connection.peer.beacon.session)?;
         for (fact, announced, described) in [
             (

@@ -15,6 +15,7 @@ use crate::liveness::Peer;
 use crate::paths::{DaemonPaths, Presence};
 use crate::port::Port;
 use crate::service::AnyThread;
+use crate::stop;
 use crate::transport::{self, Requester, SLICE, Waker, handshake};
 use crate::turn::{Turn, lock};
 use crate::{PROTOCOL_VERSION, ProtocolError, mapping, storage};
@@ -175,13 +176,12 @@ impl Connection {
 
     /// Ends the daemon, and returns when it is gone: after its groups.
     pub(crate) fn shut_down(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
-        match self.ask(&Request::Shutdown, hook) {
-            Ok(_)
-            | Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => {}
-            Err(error) => return Err(error),
-        }
         let start = Instant::now();
         let (peer, daemon) = (&self.peer, self.peer.paths.daemon()?);
+        // who waits hears the request, who is busy the file
+        let ends = stop::asked(&daemon)?;
+        self.post(&Request::Shutdown);
+        self.notify();
         let runs = |paths: &DaemonPaths| match paths.presence() {
             Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
             _ => false,
@@ -195,6 +195,7 @@ impl Connection {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
+        drop(ends);
         Ok(())
     }
 

@@ -16,6 +16,8 @@ use crate::{PROTOCOL_VERSION, ProtocolError};
 const LOOK_MAX: Duration = Duration::from_millis(500);
 /// A daemon has made the mark of its folder this long after the folder.
 const START_MAX: Duration = Duration::from_secs(60);
+/// How often the files of a daemon that still makes some are removed.
+const REMOVALS: usize = 100;
 /// File in the transport's folder that names root and daemon, and is locked as long as the daemon lives.
 const PLACE: &str = "place";
 
@@ -40,6 +42,8 @@ impl DaemonLock {
         let start = Instant::now();
         loop {
             if let Some(mut daemon_lock) = DaemonLock::try_take(paths)? {
+                // a request of a run that was killed
+                let _ = fs::remove_file(paths.stop_path());
                 daemon_lock.say(STARTING)?;
                 remove_shared_files(paths, None);
                 daemon_lock.mark = Some(mark(paths)?);
@@ -123,13 +127,34 @@ impl DaemonLock {
 impl Drop for DaemonLock {
     fn drop(&mut self) {
         remove_shared_files(&self.paths, self.mark.take());
-        // the file goes before the lock does, so nobody can lock a file that is about to go
-        let _ = fs::remove_file(self.paths.lock_path());
-        // our own folder in shared memory goes with the last daemon; any other is the user's
-        let root = self.paths.root();
-        if root.starts_with(shared_memory()) && root == default_root() {
-            let _ = fs::remove_dir(root);
+        remove_named_files(&self.paths);
+    }
+}
+
+/// Removes the files of a daemon that is about to end without dropping its [`DaemonLock`]. Only its own process may.
+pub fn remove_files(paths: &DaemonPaths) {
+    // other threads of ours may be making files
+    for _ in 0..REMOVALS {
+        remove_shared_files(paths, None);
+        if !paths.shared_folder().exists() {
+            break;
         }
+    }
+    remove_named_files(paths);
+}
+
+/// Removes the files under the daemon's root.
+fn remove_named_files(paths: &DaemonPaths) {
+    let _ = fs::remove_file(paths.stop_path());
+    // the file goes before the lock does, so nobody can lock a file that is about to go
+    let _ = fs::remove_file(paths.lock_path());
+    remove_own_root(paths.root());
+}
+
+/// Our own folder in shared memory goes with the last daemon; any other is the user's.
+pub(crate) fn remove_own_root(root: &Path) {
+    if root.starts_with(shared_memory()) && root == default_root() {
+        let _ = fs::remove_dir(root);
     }
 }
 
@@ -313,6 +338,25 @@ mod tests {
         assert_eq!(paths.presence().unwrap(), Presence::Absent);
         assert!(!Path::new(shared_memory()).join(paths.stem()).exists());
         assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn a_daemon_that_is_ended_at_once_takes_its_files_and_the_request_with_it() {
+        let root = root("at-once");
+        let paths = DaemonPaths::new(Some(&root), "busy").unwrap();
+        paths.ask_to_stop().unwrap();
+        let held = DaemonLock::take(&paths).unwrap();
+        assert!(
+            !paths.is_asked_to_stop(),
+            "the request was one of an earlier run"
+        );
+        paths.ask_to_stop().unwrap();
+        assert!(paths.is_asked_to_stop());
+        remove_files(&paths);
+        assert!(!paths.shared_folder().exists());
+        assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+        drop(held);
         fs::remove_dir(&root).unwrap();
     }
 

@@ -65,6 +65,7 @@ mod port;
 mod problem;
 mod reentrant;
 mod service;
+mod stop;
 mod storage;
 pub mod table;
 mod timing;
@@ -74,7 +75,7 @@ mod waiter;
 
 pub use client::Client;
 pub use command::{Command, OnDevice, Values};
-pub use daemon_lock::{cleanup_after_death, sweep};
+pub use daemon_lock::{cleanup_after_death, remove_files, sweep};
 pub use description::{
     Description, FieldInfo, Follower, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
 };
@@ -90,5 +91,6 @@ pub use hook::{Hook, keep_waiting};
 pub use journal::{Entry as JournalEntry, Journal};
 pub use journal_header::JournalHeader;
 pub use paths::{Beacon, running};
+pub use stop::stop;
 pub use table::{ROWS_MAX, Table};
 pub use timing::{Percentiles, Timing};

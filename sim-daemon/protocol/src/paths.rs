@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! ROOT/NAME.lock            held by flock for the daemon's life; one line: protocol version, pid, session, how many groups if any
+//! ROOT/NAME.stop            somebody asks the daemon to stop, whatever it does
 //! ROOT/NAME.0.lock          of a daemon with groups: likewise for each of them, which has the rest below, too
 //! SHARED/tl<hash>/            nodes, services, sockets and shared memory, each session with a prefix of its own;
 //!                           `place`, locked too, names ROOT and NAME; hash is over both
@@ -163,6 +164,27 @@ impl DaemonPaths {
     /// The lock file.
     pub fn lock_path(&self) -> PathBuf {
         self.root.join(format!("{}.lock", self.name))
+    }
+
+    /// The file by which somebody asks the daemon to stop.
+    pub(crate) fn stop_path(&self) -> PathBuf {
+        self.root.join(format!("{}.stop", self.name))
+    }
+
+    /// Asks the daemon to stop, also one that is too busy to answer.
+    ///
+    /// # Errors
+    /// [`ProtocolError::Root`] when the file cannot be made.
+    pub fn ask_to_stop(&self) -> Result<(), ProtocolError> {
+        let path = self.stop_path();
+        let made = private().create(true).truncate(false).open(&path);
+        made.map(drop)
+            .map_err(|error| ProtocolError::root(&path, &error))
+    }
+
+    /// Whether somebody has asked the daemon to stop.
+    pub fn is_asked_to_stop(&self) -> bool {
+        fs::symlink_metadata(self.stop_path()).is_ok()
     }
 
     /// The transport's folder.

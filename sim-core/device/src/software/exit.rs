@@ -8,6 +8,11 @@ unsafe extern "C" {
     safe fn _exit(code: i32) -> !;
 }
 
+/// Exits with this code now, whatever other threads do, and without exit handlers.
+pub fn leave_at_once(code: i32) -> ! {
+    _exit(code)
+}
+
 /// Exits with this code if an abandoned driver thread still compiles; otherwise returns.
 ///
 /// Exit handlers unload the driver's libraries, and a thread inside them would crash. `_exit` runs no exit handlers.

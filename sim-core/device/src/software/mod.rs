@@ -24,6 +24,6 @@ mod exit;
 mod first_run;
 mod precompile;
 
-pub use exit::leave;
+pub use exit::{leave, leave_at_once};
 pub(crate) use first_run::run_empty;
 pub(crate) use precompile::precompile;
