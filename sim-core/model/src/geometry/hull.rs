@@ -1,11 +1,13 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
-use super::polytope::{NoHull, triangles_around};
+use super::polytope::{NoHull, triangles_around_stretched};
+use super::stretch::stretched;
 use super::vector::{
-    Vector, add, area_vector, cross, dot, extent, longest, norm, scale, size, sub, unit,
+    Vector, add, area_vector, dot, extent, longest, norm, scale, six_volumes, size, sub, unit,
 };
 
-/// How far corners may be off a face's plane, relative to the hull's size: far above roundings of f32 files.
+/// How far corners may be off a face's plane, relative to the hull's size: far above roundings of f32 files. A thin hull is
+/// measured stretched.
 const COPLANAR: f64 = 1e-5;
 /// Largest coordinate [m]: its cube, a volume, is still far from the largest number.
 const COORDINATE_MAX: f64 = 1e100;
@@ -58,25 +60,31 @@ impl Hull {
         if !points.iter().flatten().all(|x| x.abs() <= COORDINATE_MAX) {
             return Err(NoHull::Thin);
         }
-        let size = size(points);
-        let mut hull = match triangles_around(points, vertices_max) {
-            Ok(triangles) => Hull::new(points, &triangles, COPLANAR * size),
+        let mut hull = match Hull::around(points, vertices_max) {
             Err(NoHull::Flat { normal }) => {
-                let half = scale(normal, 0.5 * PLATE * size);
+                let half = scale(normal, 0.5 * PLATE * size(points));
                 let both = points
                     .iter()
                     .flat_map(|&point| [add(point, half), sub(point, half)]);
                 let plate: Vec<Vector> = both.collect();
-                let triangles = triangles_around(&plate, vertices_max)?;
                 Hull {
                     flat: true,
-                    ..Hull::new(&plate, &triangles, COPLANAR * PLATE * size)
+                    ..Hull::around(&plate, vertices_max)?
                 }
             }
-            Err(none) => return Err(none),
+            whole => whole?,
         };
         hull.error = hull.height(points);
         Ok(hull)
+    }
+
+    fn around(points: &[Vector], vertices_max: usize) -> Result<Hull, NoHull> {
+        // where the hull is thin, its corners and faces are found among stretched points, so that its sides are no slivers
+        let stretched = stretched(points)?;
+        let triangles = triangles_around_stretched(&stretched, vertices_max)?;
+        let slack = COPLANAR * size(&stretched.points);
+        let outlines = outlines(&stretched.points, &triangles, slack);
+        Ok(Hull::new(points, outlines))
     }
 
     /// Largest height of a point above the faces' planes; 0 if all lie inside.
@@ -115,22 +123,19 @@ impl Hull {
         let Some(&origin) = self.vertices.first() else {
             return 0.0;
         };
-        let corner = |index: u32| sub(self.vertices[index as usize], origin);
+        let corner = |index: u32| self.vertices[index as usize];
         let mut volume = 0.0;
         for face in &self.faces {
             for pair in face.corners[1..].windows(2) {
-                volume += dot(
-                    corner(face.corners[0]),
-                    cross(corner(pair[0]), corner(pair[1])),
-                ) / 6.0;
+                let triangle = [face.corners[0], pair[0], pair[1]].map(corner);
+                volume += six_volumes(origin, triangle) / 6.0;
             }
         }
         volume
     }
 
-    /// Triangles with coplanar neighbours joined.
-    fn new(points: &[Vector], triangles: &[[u32; 3]], flat: f64) -> Hull {
-        let outlines = outlines(points, triangles, flat);
+    /// The hull whose faces have these outlines.
+    fn new(points: &[Vector], outlines: Vec<Vec<u32>>) -> Hull {
         let mut renamed = vec![u32::MAX; points.len()];
         let mut hull = Hull::default();
         for outline in outlines {

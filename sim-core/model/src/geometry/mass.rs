@@ -6,11 +6,13 @@
 //!
 //! signed, so that cavities subtract.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use super::shape::Shape;
+use super::stretch::{Stretched, stretched};
 use super::trimesh::TriMesh;
-use super::vector::{add, cross, dot, scale, sub};
+use super::vector::{add, cross, dot, extent, scale, sub};
 use crate::error::ModelError;
 use crate::inertia::Inertial;
 
@@ -84,12 +86,17 @@ fn cylinder(radius: f64, half_height: f64, density: f64) -> (f64, f64, f64) {
 
 /// Mass properties of what closed triangles bound.
 pub(super) fn of_triangles(mesh: &TriMesh, density: f64) -> Inertial {
-    let [low, high] = mesh.extent();
+    // the integrals of a thin mesh are those of the stretched one, mapped back: its own would be lost in roundings
+    let (points, back) = match stretched(&mesh.vertices) {
+        Ok(Stretched { points, back, .. }) => (points, back),
+        Err(_) => (Cow::Borrowed(&mesh.vertices[..]), None),
+    };
+    let [low, high] = extent(&points);
     // about the middle, so that nothing is lost far from the origin
     let middle = scale(add(low, high), 0.5);
     let (mut volume, mut first, mut second) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
     for &triangle in &mesh.triangles {
-        let [a, b, c] = mesh.corners(triangle).map(|corner| sub(corner, middle));
+        let [a, b, c] = triangle.map(|corner| sub(points[corner as usize], middle));
         let part = dot(a, cross(b, c)) / 6.0;
         let sum = add(a, add(b, c));
         volume += part;
@@ -107,6 +114,12 @@ pub(super) fn of_triangles(mesh: &TriMesh, density: f64) -> Inertial {
             second[i][j] -= volume * centre[i] * centre[j];
         }
     }
+    let mut pos = add(middle, centre);
+    if let Some(back) = &back {
+        volume *= back.volume;
+        second = back.moments(second);
+        pos = back.place(pos);
+    }
     let trace: f64 = (0..3).map(|i| second[i][i]).sum();
     let mut inertia = [[0.0; 3]; 3];
     for i in 0..3 {
@@ -117,7 +130,7 @@ pub(super) fn of_triangles(mesh: &TriMesh, density: f64) -> Inertial {
     }
     Inertial {
         mass: density * volume,
-        pos: add(middle, centre),
+        pos,
         inertia,
     }
 }

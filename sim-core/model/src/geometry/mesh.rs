@@ -7,6 +7,7 @@ use super::hull::Hull;
 use super::load::{Loaded, load};
 use super::parry::convex_parts;
 use super::polytope::triangles_around;
+use super::stretch::stretched;
 use super::trimesh::TriMesh;
 use super::vector::size;
 use crate::error::ModelError;
@@ -15,7 +16,7 @@ use crate::error::ModelError;
 const SIZE_MIN: f64 = 1e-6;
 /// Largest size of a mesh [m]: above it a unit is wrong, and inertias lose their meaning.
 const SIZE_MAX: f64 = 1e6;
-/// Least volume of a solid over the cube of its size: a folded sheet is closed and holds roundings only [–].
+/// Least volume of a solid over that of the box around it: a folded sheet is closed and holds roundings only [–].
 const FILL_MIN: f64 = 1e-12;
 /// Share of the hull's volume that a mesh may lack and still count as convex [–].
 const CONVEX: f64 = 1e-3;
@@ -147,7 +148,8 @@ impl Mesh {
         }
         let closed = triangles.is_closed()
             && triangles.turn_outward()
-            && triangles.signed_volume() > FILL_MIN * size.powi(3);
+            && stretched(&triangles.vertices)
+                .is_ok_and(|room| triangles.signed_volume() > FILL_MIN * room.room);
         let mut mesh = Mesh {
             path: path.to_owned(),
             scale,

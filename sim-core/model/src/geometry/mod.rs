@@ -13,6 +13,7 @@ mod polytope;
 mod ray_shape;
 mod shape;
 mod shown_field;
+mod stretch;
 mod tessellate;
 mod triangle_tree;
 mod trimesh;

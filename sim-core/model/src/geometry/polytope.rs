@@ -1,12 +1,9 @@
 //! Triangles around points: parry3d's hull of all of them, or of the few farthest out.
 
 use super::parry;
-use super::vector::{
-    Vector, add, area_vector, cross, dot, extent, longest, norm, scale, size, sub, unit,
-};
+use super::stretch::{Stretched, stretched};
+use super::vector::{Vector, add, area_vector, dot, extent, longest, norm, scale, size, sub, unit};
 
-/// Points with less extent than this, relative to the largest extent, count as one point, a line or a flat sheet.
-const FLAT: f64 = 1e-7;
 /// Most work on points that a thinned cloud lacks [points times triangles]: a second.
 const REFINE_MAX: usize = 1 << 28;
 /// Most iterations of that search; each leaves a small share of the error.
@@ -44,7 +41,15 @@ pub(super) fn triangles_around(
     points: &[Vector],
     vertices_max: usize,
 ) -> Result<Vec<[u32; 3]>, NoHull> {
-    let start = simplex(points)?;
+    triangles_around_stretched(&stretched(points)?, vertices_max)
+}
+
+/// The same, of points that are not thin.
+pub(super) fn triangles_around_stretched(
+    stretched: &Stretched<'_>,
+    vertices_max: usize,
+) -> Result<Vec<[u32; 3]>, NoHull> {
+    let (points, start) = (stretched.points.as_ref(), stretched.simplex);
     // few corners of a large cloud are found without the hull of all
     let work = points
         .len()
@@ -185,40 +190,4 @@ fn outermost(points: &[Vector]) -> Vec<u32> {
         .into_iter()
         .filter_map(|(_, point)| point)
         .collect()
-}
-
-/// Four points far apart: the ends of the longest axis, then the farthest from their line, then from that plane.
-pub(super) fn simplex(points: &[Vector]) -> Result<[u32; 4], NoHull> {
-    let least = FLAT * size(points);
-    let farthest = |measure: &dyn Fn(Vector) -> f64| {
-        let values = points.iter().map(|&point| measure(point)).enumerate();
-        values
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((0, 0.0))
-    };
-    let mut ends = [(0, 0.0), (0, 0.0)];
-    for axis in 0..3 {
-        let (low, _) = farthest(&|point| -point[axis]);
-        let (high, _) = farthest(&|point| point[axis]);
-        if let (Some(a), Some(b)) = (points.get(low), points.get(high))
-            && norm(sub(*b, *a)) > ends[1].1
-        {
-            ends = [(low, 0.0), (high, norm(sub(*b, *a)))];
-        }
-    }
-    if ends[1].1 <= least || least == 0.0 {
-        return Err(NoHull::Thin);
-    }
-    let (a, b) = (points[ends[0].0], points[ends[1].0]);
-    let along = unit(sub(b, a));
-    let (third, width) = farthest(&|point| norm(cross(along, sub(point, a))));
-    if width <= least {
-        return Err(NoHull::Thin);
-    }
-    let normal = unit(area_vector([a, b, points[third]]));
-    let (fourth, height) = farthest(&|point| dot(normal, sub(point, a)).abs());
-    if height <= least {
-        return Err(NoHull::Flat { normal });
-    }
-    Ok([ends[0].0, ends[1].0, third, fourth].map(|index| index as u32))
 }

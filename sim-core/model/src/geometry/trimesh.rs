@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::vector::{Vector, area_vector, cross, dot, norm, sub};
+use super::vector::{Vector, area_vector, cross, dot, norm, six_volumes, sub};
 
 /// Most work on finding which shells are cavities [triangles visited]: a second or two.
 const CAVITY_WORK_MAX: usize = 1 << 27;
@@ -40,8 +40,7 @@ impl TriMesh {
     fn signed_part(&self, triangle: [u32; 3]) -> f64 {
         // about a point of the mesh, far from the origin nothing is lost
         let origin = self.vertices[0];
-        let [a, b, c] = self.corners(triangle).map(|corner| sub(corner, origin));
-        dot(a, cross(b, c))
+        six_volumes(origin, self.corners(triangle))
     }
 
     /// Joins vertices at the same place, and leaves out triangles without area and vertices without triangle.

@@ -52,6 +52,19 @@ pub(super) fn area_vector([a, b, c]: [Vector; 3]) -> Vector {
     cross(sub(b, a), sub(c, a))
 }
 
+/// Six times the signed volume of the tetrahedron between a triangle and a point; of slivers too, since the area is that of
+/// the two shorter edges.
+pub(super) fn six_volumes(origin: Vector, [a, b, c]: [Vector; 3]) -> f64 {
+    let edges = [sub(b, a), sub(c, b), sub(a, c)];
+    let squares = edges.map(|edge| dot(edge, edge));
+    let longest = (0..3).fold(
+        0,
+        |best, i| if squares[i] > squares[best] { i } else { best },
+    );
+    let area = cross(edges[(longest + 1) % 3], edges[(longest + 2) % 3]);
+    dot(sub(a, origin), area)
+}
+
 /// Lowest and highest coordinates of points; both infinite where there is none.
 pub(super) fn extent(points: &[Vector]) -> [Vector; 2] {
     let mut low = [f64::INFINITY; 3];

@@ -11,7 +11,7 @@ use sim_model::{Shape, UrdfOptions};
 
 use crate::files::{Folder, brick, joined, mapped, obj};
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -26,7 +26,7 @@ fn size(points: &[[f64; 3]]) -> f64 {
 /// Asserts what contacts rely on: Euler's formula, each edge between two faces, corners on their faces' planes and below
 /// all others, and the points inside up to the error it tells.
 #[track_caller]
-fn assert_sound(hull: &Hull, points: &[[f64; 3]]) {
+pub fn assert_sound(hull: &Hull, points: &[[f64; 3]]) {
     let size = size(points);
     assert_eq!(
         hull.vertices.len() + hull.faces.len(),
@@ -332,7 +332,7 @@ proptest! {
 }
 
 /// An L of two bricks that share a side, as one closed surface.
-fn angle() -> TriMesh {
+pub fn angle() -> TriMesh {
     let outline = [
         [0.0, 0.0],
         [2.0, 0.0],

@@ -6,3 +6,4 @@ mod hulls;
 mod looks;
 mod mass;
 mod refused;
+mod thin;
