@@ -18,9 +18,10 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from franka_lesson import FRAMES, HERE, REFERENCE, URDF
+from franka_lesson import FRAMES, REFERENCE, URDF
 from franka_lesson import scene as arm_on_its_stand
 from numpy.typing import NDArray
+from places import OUT
 from tqdm import tqdm
 
 import tightloop as tl
@@ -176,7 +177,7 @@ def main() -> None:
     parser.add_argument("--mu", type=float, nargs="+", default=FRICTIONS, help="coefficients of friction")
     parser.add_argument("--precision", default="f32", choices=["f32", "f64"], help="precision of the run (default f32)")
     parser.add_argument("--threads", type=int, default=None, help="most threads a step may use (default: all cores)")
-    parser.add_argument("--out", type=Path, default=HERE.parent / "out", help="folder of the plot (default out/)")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of the plot (default out/)")
     args = parser.parse_args()
 
     share = max(1, args.worlds // len(args.mu))

@@ -17,6 +17,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from tqdm import tqdm
 
 import tightloop as tl
@@ -25,7 +26,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 HERE = Path(__file__).parent
-REFERENCE = HERE.parent / "tests/data"
+REFERENCE = HERE / "assets/reference"
 URDF = HERE / "assets/fr3/fr3_franka_hand.urdf"
 
 FRAMES = 180  # 3 s at 60 Hz
@@ -137,7 +138,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=4096, help="number of worlds (default 4096)")
     parser.add_argument("--precision", default="f32", choices=["f32", "f64"], help="precision of the run (default f32)")
     parser.add_argument("--threads", type=int, default=None, help="most threads a step may use (default: all cores)")
-    parser.add_argument("--out", type=Path, default=HERE.parent / "out", help="folder of the plot (default out/)")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of the plot (default out/)")
     args = parser.parse_args()
 
     reference = {

@@ -1,6 +1,6 @@
 """Runs a policy file in the loop, and draws what it did.
 
-    pip install matplotlib onnxruntime
+    pip install matplotlib onnxruntime tqdm
     python examples/play.py FrankaReach out/ppo/FrankaReach-0/policy.onnx
     python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --film out/pick.mp4
     python examples/play.py FrankaPickCube examples/trained/FrankaPickCube.onnx --num-envs 16 --view
@@ -18,8 +18,9 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
-from filming import film_of
+from filming import Shooting, film_of
 from numpy.typing import NDArray
+from places import OUT
 from training import needed
 
 from evaluation import metrics
@@ -27,14 +28,14 @@ from tightloop.env import AutoresetMode, VectorEnv
 from tightloop.view import Film
 from tightloop.view.cameras import PRESETS
 
-with needed("matplotlib", "onnxruntime"):
+with needed("matplotlib", "onnxruntime", "tqdm"):
     import matplotlib
     import onnxruntime
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "play"
+RUNS = OUT / "play"
 SHOWN = 8  # worlds in the picture
 
 
@@ -43,10 +44,12 @@ def play(
 ) -> dict[str, NDArray[np.float64]]:
     """One episode in every world: what was seen, done, and got, ``(steps, worlds, …)``; NaN after an episode's end."""
     obs, _ = envs.reset(seed=seed)
+    shooting = None if film is None else Shooting(envs.max_episode_steps, "film")
     going, kept = np.ones(envs.num_envs, bool), {"obs": [], "action": [], "reward": []}
     while going.any():
-        if film is not None:
+        if film is not None and shooting is not None:
             film.add(envs.frame, goals=envs.marks)
+            shooting.step()
         (action,) = policy.run(["action"], {"obs": obs})
         seen = obs
         obs, reward, terminated, truncated, infos = envs.step(action)
@@ -56,6 +59,8 @@ def play(
         for name, array in step.items():
             kept.setdefault(name, []).append(np.where(going.reshape(-1, *[1] * (np.ndim(array) - 1)), array, np.nan))
         going &= ~(terminated | truncated)
+    if shooting is not None:
+        shooting.close()
     return {name: np.array(arrays) for name, arrays in kept.items()}
 
 
@@ -101,7 +106,7 @@ def main() -> None:
     parser.add_argument("--camera", choices=list(PRESETS), help="of the film (default: follow if the robot floats)")
     parser.add_argument("--out", type=Path, help="picture (default out/play/TASK.png)")
     args = parser.parse_args()
-    out = args.out or OUT / f"{args.task.rpartition(':')[2]}.png"
+    out = args.out or RUNS / f"{args.task.rpartition(':')[2]}.png"
 
     policy = onnxruntime.InferenceSession(args.policy, providers=["CPUExecutionProvider"])
     made = json.loads(policy.get_modelmeta().custom_metadata_map.get("task_options", "{}"))

@@ -1,7 +1,7 @@
-"""Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347) in one file, made for the zero-copy loop.
+"""Proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347), made for the zero-copy loop.
 
     pip install matplotlib onnx onnxscript tensorboard torch tqdm
-    python examples/ppo.py FrankaReach --seed 0
+    python examples/ppo.py FrankaReach --seed 0     # with the wheel alone: python -m tightloop.train FrankaReach
 
 Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What
 an action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is
@@ -10,9 +10,9 @@ divergence).
 
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
 TensorBoard, the curve as CSV and PNG, and the policy as ONNX with its metadata, which ``examples/play.py`` runs.
-``--wandb`` logs to Weights & Biases, too, and ``--film-every 5`` films the policy every five minutes. It writes
-elsewhere only with ``--out``. With ``--daemon NAME`` it joins worlds that ``python -m tightloop.env serve TASK --name
-NAME`` keeps, so that it can be killed and come back.
+``--wandb`` logs to Weights & Biases, too. ``--film-every 5`` films the policy every five minutes, in another process.
+It writes elsewhere only with ``--out``. With ``--daemon NAME`` it joins worlds that
+``python -m tightloop.env serve TASK --name NAME`` keeps, so that it can be killed and come back.
 
 A terminal shows a progress bar; a file or a pipe gets a line per evaluation. The log has all metrics of the task. Terms
 of a reward are in it if `Task.metrics` returns them; a name should end with its unit, such as ``height_m``.
@@ -37,8 +37,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from training import draw, needed, report
-from training_log import Films, Log, Statistics
+from training_films import Films
+from training_log import Log, Statistics
 from training_watch import TermWatch, nothing_learnt
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
@@ -50,12 +52,13 @@ from tightloop.whole_files import whole_file
 # onnx and onnxscript are needed only at the end, for the policy's file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
+    from agent import Agent
     from policy_file import export
     from torch import Tensor, nn
     from tqdm import tqdm
 
 MODEL_MINUTES = 10.0  # for robots that are not the task's own, at least
-OUT = Path(__file__).resolve().parent.parent / "out" / "ppo"
+RUNS = OUT / "ppo"
 
 
 @dataclass(frozen=True)
@@ -106,66 +109,6 @@ PRESETS = {
     "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
 }
-
-
-class Normalizer(nn.Module):
-    """Shifts and scales observations by the mean and variance of all that were seen (Chan et al. 1979)."""
-
-    mean: Tensor
-    var: Tensor
-    count: Tensor
-
-    def __init__(self, size: int) -> None:
-        super().__init__()
-        self.register_buffer("mean", torch.zeros(size))
-        self.register_buffer("var", torch.ones(size))
-        self.register_buffer("count", torch.tensor(1e-4))
-
-    def see(self, obs: Tensor) -> None:
-        """Take observations ``(…, size)`` into account."""
-        obs = obs.reshape(-1, obs.shape[-1])
-        count, mean, var = len(obs), obs.mean(0), obs.var(0, correction=0)
-        total = self.count + count
-        apart = mean - self.mean
-        self.var.copy_((self.var * self.count + var * count + apart**2 * self.count * count / total) / total)
-        self.mean.add_(apart * count / total)
-        self.count.copy_(total)
-
-    def forward(self, obs: Tensor) -> Tensor:
-        return ((obs - self.mean) / torch.sqrt(self.var + 1e-6)).clamp(-10.0, 10.0)
-
-
-def mlp(inputs: int, hidden: int, outputs: int, last: float) -> nn.Sequential:
-    """Two hidden layers; orthogonal weights, those of the last layer scaled by ``last``."""
-    layers = [nn.Linear(inputs, hidden), nn.Linear(hidden, hidden), nn.Linear(hidden, outputs)]
-    for layer, gain in zip(layers, (math.sqrt(2.0), math.sqrt(2.0), last), strict=True):
-        nn.init.orthogonal_(layer.weight, gain)
-        nn.init.zeros_(layer.bias)
-    return nn.Sequential(layers[0], nn.ELU(), layers[1], nn.ELU(), layers[2])
-
-
-class Agent(nn.Module):
-    """An actor, whose actions are normal about its output, and a critic, which may see more than the actor."""
-
-    def __init__(self, inputs: int, actions: int, critic_inputs: int, config: Config) -> None:
-        super().__init__()
-        self.normalizer, self.critic_normalizer = (Normalizer(inputs), Normalizer(critic_inputs))
-        self.actor = mlp(inputs, config.hidden, actions, 0.01)
-        self.critic = mlp(critic_inputs, config.hidden, 1, 1.0)
-        self.log_std = nn.Parameter(torch.full((actions,), math.log(config.std)))
-
-    def forward(self, obs: Tensor) -> Tensor:
-        """The most likely action, ``(…, actions)``."""
-        return self.actor(self.normalizer(obs))
-
-    def value(self, obs: Tensor) -> Tensor:
-        """What is still to come, ``(…,)``, at observations of the critic."""
-        return self.critic(self.critic_normalizer(obs)).squeeze(-1)
-
-    def log_prob(self, mean: Tensor, action: Tensor) -> Tensor:
-        """Logarithm of the probability of actions about ``mean``, ``(…,)``."""
-        off = (action - mean) * torch.exp(-self.log_std)
-        return (-0.5 * off**2 - self.log_std - 0.5 * math.log(2.0 * math.pi)).sum(-1)
 
 
 class Rollout:
@@ -223,7 +166,8 @@ class Trainer:
         space = self.envs.evaluation.privileged_space
         critic_inputs = None if space is None else space.shape[0]
         self.device = torch.device(device)
-        self.agent = Agent(inputs, actions, inputs if critic_inputs is None else critic_inputs, config).to(self.device)
+        self.sizes = (inputs, actions, inputs if critic_inputs is None else critic_inputs, config.hidden, config.std)
+        self.agent = Agent(*self.sizes).to(self.device)
         self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
         self.acting = copy.deepcopy(self.agent)
         self.rollouts = [Rollout(config, inputs, actions, critic_inputs, self.device) for _ in range(2)]
@@ -392,13 +336,21 @@ class Trainer:
                     # a run that goes on from the checkpoint begins the same episodes
                     seen = self.begin()
                 log.write(news, self.steps)
-                self.films.take(self.act, self.seconds, self.steps)
+                if (problem := self.films.take(self.snapshot, self.seconds, self.steps)) is not None:
+                    bar.write(f"warning: {problem}", file=sys.stderr)
 
     def _is_due(self, shown: float) -> bool:
         """Whether to evaluate, some time after the last one: seconds, or steps if the run ends by these."""
         by_steps = self.steps - shown >= self.config.evaluate_steps
         by_time = self.seconds - shown >= self.config.evaluate
         return (by_steps if self.config.total else by_time) or self.progress >= 1.0
+
+    def snapshot(self, path: Path, about: str) -> None:
+        """Write the policy to a file from which another process makes it again."""
+        weights = {name: value.cpu() for name, value in self.acting.state_dict().items()}
+        state = {"sizes": self.sizes, "agent": weights, "about": about}
+        with whole_file(path, durable=False) as part:
+            torch.save(state, part)
 
     def save(self) -> None:
         """Write the checkpoint."""
@@ -438,7 +390,8 @@ class Trainer:
         return path
 
     def close(self) -> None:
-        """End the environment."""
+        """End the environment, and a film that is being made."""
+        self.films.close()
         self.envs.close()
 
 
@@ -454,7 +407,7 @@ def main() -> None:
     parser.add_argument("--daemon", help="name of a running daemon to join")
     parser.add_argument("--device", default="cpu", help="where torch computes")
     parser.add_argument("--wandb", action="store_true", help="log to Weights & Biases, too")
-    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs")
+    parser.add_argument("--out", type=Path, default=RUNS, help="folder of all runs")
     for option in fields(Config):
         kind = type(option.default)
         how = {"action": argparse.BooleanOptionalAction} if kind is bool else {"type": kind}
@@ -491,6 +444,8 @@ def main() -> None:
         print(f"{end['seconds']:.0f} s, {end['steps']:,} steps: {told_with_intervals(found)}")
         if (warning := nothing_learnt(trainer.curve)) is not None:
             print(f"warning: {warning}", file=sys.stderr)
+        if (problem := trainer.films.finish()) is not None:
+            print(f"warning: {problem}", file=sys.stderr)
         print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
     finally:
         trainer.close()

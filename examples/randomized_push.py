@@ -17,6 +17,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 
 import tightloop as tl
 
@@ -118,7 +119,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of frictions, masses and starts (default 0)")
     parser.add_argument("--precision", default="f32", choices=["f32", "f64"], help="precision of the run (default f32)")
     parser.add_argument("--threads", type=int, default=None, help="most threads a step may use (default: all cores)")
-    parser.add_argument("--out", type=Path, default=HERE.parent / "out", help="folder of the plot (default out/)")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder of the plot (default out/)")
     args = parser.parse_args()
 
     done = run(worlds=args.worlds, seed=args.seed, precision=args.precision, threads=args.threads)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from training import needed, report
 
 from evaluation import evaluate, told
@@ -28,12 +29,13 @@ from tightloop.env import AutoresetMode, policy_metadata
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     import torch.distributed as dist
+    from agent import Agent, Normalizer
     from policy_file import export
-    from ppo import PRESETS, Agent, Config, Normalizer, Rollout
+    from ppo import PRESETS, Config, Rollout
     from torch import Tensor, nn
     from torch.nn.parallel import DistributedDataParallel
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "ddp"
+RUNS = OUT / "ddp"
 
 
 class Loss(nn.Module):
@@ -74,7 +76,7 @@ class Trainer:
             raise SystemExit(f"train_ddp.py: the critic of {task} sees more than its actor; choose another task")
         (inputs,), (actions,) = self.envs.single_observation_space.shape, self.envs.single_action_space.shape
         torch.manual_seed(seed)  # all ranks begin with the same weights
-        self.agent = Agent(inputs, actions, inputs, config)
+        self.agent = Agent(inputs, actions, inputs, config.hidden, config.std)
         self.loss = DistributedDataParallel(Loss(self.agent, config))
         self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
         self.rollout = Rollout(self.config, inputs, actions, None, torch.device("cpu"))
@@ -156,7 +158,7 @@ def main() -> None:
     parser.add_argument("task", choices=PRESETS, help="what to learn")
     parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes (default 0)")
     parser.add_argument("--rollouts", type=int, default=60, help="rollouts to learn from (default 60)")
-    parser.add_argument("--out", type=Path, default=OUT, help="folder of all runs (default out/ddp/)")
+    parser.add_argument("--out", type=Path, default=RUNS, help="folder of all runs (default out/ddp/)")
     args = parser.parse_args()
     rank, config = Rank.of_process(), PRESETS[args.task]
     torch.set_num_threads(1)  # several would take cores from the daemons

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from training import command_line, needed, report
 
 from evaluation import evaluate, told
@@ -30,7 +31,7 @@ with needed("onnx", "onnxscript", "rsl_rl", "torch", "tqdm"):
 
     from tightloop.adapters.rsl_rl import GROUP, RslRlVecEnv
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "rsl_rl"
+RUNS = OUT / "rsl_rl"
 EVALUATED = 25  # iterations between two evaluations
 
 
@@ -121,4 +122,4 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
 
 
 if __name__ == "__main__":
-    command_line("rsl_rl", PRESETS, OUT, train, "model.pt")
+    command_line("rsl_rl", PRESETS, RUNS, train, "model.pt")

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from training import command_line, needed, report
 
 from evaluation import evaluate, told
@@ -29,7 +30,7 @@ with needed("stable_baselines3", "torch", "tqdm"):
 
     from tightloop.adapters.sb3 import Sb3VecEnv
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "sb3"
+RUNS = OUT / "sb3"
 EVALUATED = 20  # rollouts between two evaluations
 
 
@@ -131,4 +132,4 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
 
 
 if __name__ == "__main__":
-    command_line("Stable-Baselines3", PRESETS, OUT, train, "model.zip")
+    command_line("Stable-Baselines3", PRESETS, RUNS, train, "model.zip")

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from places import OUT
 from training import command_line, needed, report
 
 from evaluation import evaluate, told
@@ -34,7 +35,7 @@ with needed("skrl", "torch", "tqdm"):
 
     from tightloop.adapters.skrl import SkrlEnv
 
-OUT = Path(__file__).resolve().parent.parent / "out" / "skrl"
+RUNS = OUT / "skrl"
 EVALUATED = 20  # updates between two evaluations
 
 
@@ -162,4 +163,4 @@ def train(task: str, preset: Preset, seed: int, folder: Path, threads: int) -> d
 
 
 if __name__ == "__main__":
-    command_line("skrl", PRESETS, OUT, train, "model.pt")
+    command_line("skrl", PRESETS, RUNS, train, "model.pt")

@@ -1,22 +1,17 @@
-"""What `ppo.py` writes while it trains: means of the rollouts, to TensorBoard and Weights & Biases, and films."""
+"""What `ppo.py` writes while it trains: means of the rollouts, to TensorBoard and Weights & Biases."""
 
 from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filming import film_of
 from numpy.typing import NDArray
 
 from evaluation import metrics, with_unit
-from tightloop.env import VectorEnv
-
-SECONDS = 10.0  # of a film, at most
-FILMED = 4  # worlds in it
 
 
 class Statistics:
@@ -107,47 +102,3 @@ class Log:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-class Films:
-    """A film of the policy every so many minutes, ``FOLDER/films/STEPS.mp4``."""
-
-    def __init__(self, task: str, made: Mapping[str, Any], folder: Path, minutes: float, threads: int) -> None:
-        """Make no film yet.
-
-        Args:
-            task: Name of the task.
-            made: How the task is made.
-            folder: Folder of the run.
-            minutes: Between two films; 0 for none.
-            threads: Most threads that a step of the simulation may use.
-        """
-        self._task, self._made, self._folder = task, made, folder / "films"
-        self._spacing, self._threads = 60.0 * minutes, threads
-        self._next: float | None = None
-
-    def take(self, act: Callable[[NDArray[np.float32]], NDArray[Any]], seconds: float, steps: int) -> None:
-        """Film, if it is time to.
-
-        Args:
-            act: The policy: actions for observations, both with the worlds first.
-            seconds: Time since the start of the run.
-            steps: Env steps since then, the name of the film.
-        """
-        if not self._spacing:
-            return
-        # a run that was resumed makes no films of the time before
-        due = self._next is not None and seconds >= self._next
-        if due or self._next is None:
-            self._next = self._spacing * (seconds // self._spacing + 1.0)
-        if not due:
-            return
-        envs = VectorEnv(self._task, FILMED, threads=self._threads, render_mode="rgb_array", **self._made)
-        try:
-            obs, _ = envs.reset(seed=0)
-            with film_of(envs, self._folder / f"{steps}.mp4", None) as film:
-                for _ in range(min(envs.max_episode_steps or 10**9, round(SECONDS / envs.control_dt))):
-                    film.add(envs.frame, goals=envs.marks)
-                    obs = envs.step(act(obs))[0]
-        finally:
-            envs.close()

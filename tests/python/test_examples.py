@@ -41,7 +41,7 @@ TRAINING = {
 # Libraries that each needs, as pip names them.
 LIBRARIES = {
     "evaluation.py": "onnxruntime",
-    "play.py": "matplotlib onnxruntime",
+    "play.py": "matplotlib onnxruntime tqdm",
     "policy_file.py": "onnx",
     "ppo.py": "matplotlib onnx onnxscript tensorboard torch tqdm",
     "sim2sim.py": "mujoco onnxruntime",
@@ -59,7 +59,15 @@ importlib.util.find_spec = lambda name, package=None: None if name in missing el
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 # Modules of the others.
-PARTS = {"filming.py", "training.py", "training_log.py", "training_watch.py"}
+PARTS = {
+    "agent.py",
+    "filming.py",
+    "places.py",
+    "training.py",
+    "training_films.py",
+    "training_log.py",
+    "training_watch.py",
+}
 
 
 @pytest.mark.parametrize("name", RUNS)

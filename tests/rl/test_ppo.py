@@ -80,6 +80,7 @@ def test_it_learns_to_balance_and_its_policy_plays(tmp_path: Path) -> None:
         f"{EXAMPLES}/play.py", "CartPoleBalance", str(folder / "policy.onnx"), "--num-envs", "2", "--film", str(film)
     )
     assert filmed.returncode == 0 and film.stat().st_size > 10_000, filmed.stderr
+    assert re.search(r"^film: \d+ of at most 500 steps, \d+ s$", filmed.stdout, re.M), filmed.stdout
     wrong = run(f"{EXAMPLES}/play.py", "FrankaReach", str(folder / "policy.onnx"))
     assert wrong.returncode == 1 and "takes 5 numbers, and FrankaReach has 32" in wrong.stderr
 
@@ -127,6 +128,46 @@ def test_a_run_leaves_films_and_a_log_of_wandb_and_ends_with_intervals(tmp_path:
     assert list((folder / "wandb").glob("offline-run-*/*.wandb"))
     # at the end means have intervals
     assert re.search(r"steps: return [\d.]+ \([\d.]+ to [\d.]+\)$", done.stdout, re.M), done.stdout
+
+
+FILMING = """
+import sys, time
+import ppo
+config = ppo.Config(num_envs=8, film_every=1.0)
+trainer = ppo.Trainer("CartPoleBalance", 0, config, sys.argv[1], daemon=None, device="cpu")
+assert trainer.films.take(trainer.snapshot, 0.0, 0) is None
+begun = time.perf_counter()
+assert trainer.films.take(trainer.snapshot, 61.0, 100) is None
+taken, process = time.perf_counter() - begun, trainer.films._process
+busy = trainer.films.take(trainer.snapshot, 121.0, 200)
+print(taken, process.pid, busy, flush=True)
+time.sleep(300)
+"""
+
+
+def test_a_film_is_made_beside_the_training_and_ends_with_it(tmp_path: Path) -> None:
+    beside = os.environ | {"PYTHONPATH": os.pathsep.join([str(EXAMPLES), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-c", FILMING, str(tmp_path)]
+    with subprocess.Popen(command, env=beside, stdout=subprocess.PIPE, text=True) as trainer:
+        try:
+            assert trainer.stdout is not None
+            taken, pid, busy = trainer.stdout.readline().split(maxsplit=2)
+            # a film has 300 pictures, each some 20 ms
+            assert float(taken) < 2.0, taken
+            assert busy.strip() == "100.mp4 is not done, so there is no film of 200 steps; film less often"
+            deadline = time.monotonic() + 120
+            while not list((tmp_path / "films").glob("*.mp4")) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            assert list((tmp_path / "films").glob("*.mp4")), "the film has begun"
+            # the 19th field, after the name and 16 others
+            nice = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[16]
+            assert int(nice) >= 10
+        finally:
+            trainer.kill()
+    deadline = time.monotonic() + 30
+    while Path(f"/proc/{pid}").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not Path(f"/proc/{pid}").exists() and not list((tmp_path / "films").iterdir())
 
 
 def test_what_wandb_and_films_need_is_checked_at_the_start(tmp_path: Path) -> None:

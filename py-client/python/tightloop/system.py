@@ -30,32 +30,50 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-def give_way() -> None:
-    """Let other processes go first where there are not enough cores."""
+def give_way(niceness: int = _NICENESS) -> None:
+    """Let other processes go first where there are not enough cores; processes that this one starts do so, too.
+
+    Args:
+        niceness: How far to step back, 1 to 19; Windows knows one step.
+    """
     if sys.platform == "win32":
         _kernel().SetPriorityClass(_CURRENT_PROCESS, _BELOW_NORMAL)
         return
-    os.nice(_NICENESS)
-    # Linux weighs sessions against each other first; one that is ours alone steps back as a whole
-    if sys.platform == "linux" and os.getsid(0) == os.getpid():
+    os.nice(niceness)
+    if os.getsid(0) == os.getpid():
+        give_way_as_session(os.getpid(), niceness)
+
+
+def give_way_as_session(leader: int, niceness: int) -> None:
+    """Let a session step back as a whole, since Linux weighs sessions against each other first.
+
+    Args:
+        leader: Process id of the first process of the session, such as one of `start_apart`.
+        niceness: How far, 1 to 19.
+    """
+    if sys.platform == "linux":
+        # not every kernel groups sessions
         with contextlib.suppress(OSError):
-            Path("/proc/self/autogroup").write_text(f"{_NICENESS}")
+            Path(f"/proc/{leader}/autogroup").write_text(f"{niceness}")
 
 
-def start_apart(command: Sequence[str], *, stdin: int | None = None) -> subprocess.Popen[bytes]:
+def start_apart(
+    command: Sequence[str], *, stdin: int | None = None, stderr: int | None = None
+) -> subprocess.Popen[bytes]:
     """Start a process that Ctrl-C in this terminal does not reach, with a pipe as its standard output.
 
     Args:
         command: The program and its arguments.
         stdin: As of `subprocess.Popen`.
+        stderr: As of `subprocess.Popen`.
 
     Raises:
         OSError: The system starts no such process.
     """
     if sys.platform == "win32":
         flags = subprocess.CREATE_NEW_PROCESS_GROUP
-        return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, creationflags=flags)
-    return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, start_new_session=True)
+        return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=stderr, creationflags=flags)
+    return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=stderr, start_new_session=True)
 
 
 def ask_to_end(process: subprocess.Popen[bytes]) -> None:
