@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vulkan_layer import Layer
 
 import tightloop as tl
+from tightloop import advice
 from tightloop.env import VectorEnv
 
 REPOSITORY = Path(__file__).parents[2]
@@ -69,6 +70,12 @@ def validated(layer: Layer) -> Iterator[None]:
     yield
     said = layer.words()
     assert not said, said
+
+
+@pytest.fixture(autouse=True)
+def untold() -> None:
+    """No test has seen a warning before."""
+    advice.forget()
 
 
 @pytest.fixture

@@ -1,8 +1,13 @@
-"""Warnings of what is valid and most likely a mistake, at the line of the user's code that led to them."""
+"""Warnings of what is valid and most likely a mistake, at the line of the user's code that led to them.
+
+Each cause is reported once per process. A warning that is an error, or that a filter ignores, is not counted as
+reported.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -22,11 +27,44 @@ _OWN = f"{Path(__file__).parent}{os.sep}"
 _SOURCE: ContextVar[Callable[[], tuple[int, str] | None] | None] = ContextVar("_SOURCE", default=None)
 #: Speeds above this say which dof went wrong [rad/s or m/s].
 _FAST = 20.0
+#: Causes that this process has reported, and how many it remembers.
+_TOLD: set[str] = set()
+_TOLD_MAX = 4096
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 
 
-def warn(message: str) -> None:
-    """Warn with the place of the user's code: the innermost call from outside of this package and of libraries."""
-    warnings.warn(message, TightloopWarning, stacklevel=_level())
+def warn(message: str, *, cause: str | None = None) -> None:
+    """Warn with the place of the user's code: the innermost call from outside of this package and of libraries.
+
+    Args:
+        message: What is wrong, and the cure.
+        cause: What warnings of the same mistake share; the message if left out. A later one is silent.
+    """
+    cause = message if cause is None else cause
+    if cause in _TOLD:
+        return
+    level, _ = _user()
+    warnings.warn(message, TightloopWarning, stacklevel=level)
+    if len(_TOLD) < _TOLD_MAX and not _is_ignored(message):
+        _TOLD.add(cause)
+
+
+def warn_of_values(message: str) -> None:
+    """Warn of values of one simulation; the same message with other numbers has the same cause."""
+    warn(message, cause=_NUMBER.sub("#", message))
+
+
+def forget() -> None:
+    """Report every cause again."""
+    _TOLD.clear()
+
+
+def _is_ignored(message: str) -> bool:
+    """Return whether a filter for all modules ignores the warning."""
+    for action, text, category, module, line in warnings.filters:
+        if issubclass(TightloopWarning, category) and (text is None or text.match(message)):
+            return action == "ignore" and module is None and not line
+    return False
 
 
 @contextmanager
@@ -69,7 +107,9 @@ def tell_of_faults(  # noqa: PLR0917 (called from Rust, by place)
         first, spoiled = command if given is None else given
         after = f"{_worlds(faulted, frame)} world {first}, after its step {frame.step[first]}, since its {spoiled}. "
         who = "the policy and its observations" if given is not None else "what computes it"
-        warn(f"{after}Check {who} for NaN and infinity.{_cure(on_fault)} Later faults are not reported")
+        _warn_of_faults(
+            f"{after}Check {who} for NaN and infinity.{_cure(on_fault)} Later faults are not reported", "a command"
+        )
         return
     if frame.status[first] & 8:
         known = [f"|{name}| of {bound:g}" for name, bound in zip(("joint_q", "joint_qd"), bounds, strict=True) if bound]
@@ -81,12 +121,20 @@ def tell_of_faults(  # noqa: PLR0917 (called from Rust, by place)
         fastest = int(speeds.argmax())
         if speeds[fastest] > _FAST:
             state = f" Just before, `{dof_names[fastest]}` was fastest, at {frame.joint_qd[first, fastest]:.3g}."
-    warn(
+    _warn_of_faults(
         f"{_worlds(faulted, frame)} world {first}, after its step {frame.step[first]}, with "
         f"{reason}.{state} Usual causes are a long dt, gains too large for light links, and shapes that start inside "
         f"of others. Use a smaller dt, more substeps, smaller gains, or joint_armature."
-        f"{_cure(on_fault)} Later faults are not reported"
+        f"{_cure(on_fault)} Later faults are not reported",
+        reason,
     )
+
+
+def _warn_of_faults(message: str, reason: str) -> None:
+    # a fault is an event: another line of the user's code reports it again, such as an edited cell of a notebook
+    _, frame = _user()
+    place = "" if frame is None else f"{frame.f_code.co_filename}:{frame.f_lineno}"
+    warn(message, cause=f"fault by {reason} at {place}")
 
 
 def _worlds(faulted: Any, frame: Any) -> str:
@@ -103,16 +151,17 @@ def _cure(on_fault: str) -> str:
     )
 
 
-def _level() -> int:
-    """Return the stack level of the caller's user, as ``warnings.warn`` counts it in the caller."""
+def _user() -> tuple[int, FrameType | None]:
+    """Return the stack level of the caller's user, as ``warnings.warn`` counts it in the caller, and its frame."""
     frame: FrameType | None = sys._getframe(1)
-    level, outside = 0, None
+    level = 0
+    outside: tuple[int, FrameType] | None = None
     while frame is not None:
         level += 1
         file = frame.f_code.co_filename
         if not file.startswith(_OWN):
-            outside = level if outside is None else outside
+            outside = (level, frame) if outside is None else outside
             if f"{os.sep}site-packages{os.sep}" not in file and not file.startswith("<frozen"):
-                return level
+                return level, frame
         frame = frame.f_back
-    return level if outside is None else outside
+    return (level, None) if outside is None else outside

@@ -62,7 +62,7 @@ class ParamsAdvice:
             problem = looks[name](given[name][rows], rows, before)
             if problem:
                 self._told.add(name)
-                advice.warn(f"params.{name} {problem}")
+                advice.warn_of_values(f"params.{name} {problem}")
 
     def _gravity(self, values: NDArray[Any], rows: NDArray[Any], before: Any) -> str | None:
         wrong = np.flatnonzero((values[:, 2] > 0.0) & (values[:, 2] != values[:, 0]))

@@ -58,7 +58,8 @@ class Running:
         cure = cure.format(attribute=attribute, name=name)
         advice.warn(
             f"{subject}: `{attribute}` changes the scene after the launch of `{running[0]}`, which keeps what it had. "
-            f"For that simulation, {cure}. The next launch has the change"
+            f"For that simulation, {cure}. The next launch has the change",
+            cause=f"{subject}: `{attribute}` changes the scene after the launch",
         )
 
     def __deepcopy__(self, memo: Any) -> Running:

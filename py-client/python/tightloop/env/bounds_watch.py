@@ -73,7 +73,7 @@ class BoundsWatch:
             self._told.add(place)
             value = f"value {worst} of " if part.size > 1 else ""
             low, high = part.bounds[:, worst]
-            advice.warn(
+            advice.warn_of_values(
                 f"{self._task}.observe: {value}`{part.name}` was beyond its bounds, {low:g} to {high:g}, in "
                 f"{share:.0%} of the steps, by up to {self._largest[place][worst]:.3g}, and was clipped, so that a "
                 f'policy cannot tell such values apart. Give Observed("{part.name}", …) wider bounds, or scale what '
