@@ -30,6 +30,15 @@ _KINDS = {
     "scene": ("a scene file", "Scene.load(path) reads it"),
 }
 
+#: Endings of formats that a scene is not saved in, and what to do for each.
+_NOT_SAVED = {
+    **dict.fromkeys((".json", ".yaml", ".yml", ".ini", ".cfg"), ""),
+    **dict.fromkeys((".npy", ".npz", ".pkl", ".pickle", ".pt", ".h5", ".tlrec"), ""),
+    **dict.fromkeys((".xml", ".mjcf"), ", or write the text of scene.to_mujoco() for MuJoCo"),
+    **dict.fromkeys((".urdf", ".xacro", ".sdf", ".usd", ".usda", ".usdc", ".usdz"), ""),
+    **dict.fromkeys((".obj", ".stl", ".dae", ".glb", ".gltf", ".ply"), ""),
+}
+
 
 def root_element(text: str) -> str | None:
     """Return the name of the first element of XML, or None."""
@@ -80,6 +89,14 @@ def instead(call: str, given: Any, wanted: str) -> str | None:
         return None
     what, cure = _KINDS[kind]
     return f"{call}: {path.name} is {what}: {cure}"
+
+
+def not_a_scene_ending(path: Path) -> str | None:
+    """Return why a scene is not saved under a path, and the cure; None if its ending is that of no other format."""
+    more = _NOT_SAVED.get(path.suffix.lower())
+    if more is None:
+        return None
+    return f"path ends with {path.suffix}, and scene files are TOML; give {path.with_suffix('.toml').name!r}{more}"
 
 
 def _is_there(given: str) -> bool:

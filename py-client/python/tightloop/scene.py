@@ -18,7 +18,7 @@ from tightloop import _core, advice, checks, height_fields, mjcf, notebook
 from tightloop.body import Body
 from tightloop.checks import Vector
 from tightloop.errors import SceneError, UrdfError
-from tightloop.file_kinds import instead
+from tightloop.file_kinds import instead, not_a_scene_ending
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
@@ -329,9 +329,11 @@ class Scene(SceneRandomization):
             path: The file.
 
         Raises:
-            SceneError: The file cannot be written.
+            SceneError: The file cannot be written, or its ending is that of another format, such as ``.json``.
         """
         file = checks.path("save: path", path)
+        if problem := not_a_scene_ending(file):
+            raise SceneError(f"save: {problem}")
         kept = {model.name: keep_beside(file, model) for model in self.models.values()}
         paths = {
             shape.name: height_fields.keep_beside(file, shape.name, shape.path)
