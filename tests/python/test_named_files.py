@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tightloop as tl
@@ -45,7 +46,7 @@ def pipe(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["pipe", "/dev/zero", "folder"])
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero", "/dev/null", "folder"])
 def test_what_is_no_file_is_refused_by_name_and_not_waited_for(tmp_path, pipe, name):
     (tmp_path / "folder").mkdir()
     path = tmp_path / name
@@ -53,6 +54,8 @@ def test_what_is_no_file_is_refused_by_name_and_not_waited_for(tmp_path, pipe, n
         (lambda: tl.Snapshot.load(path), tl.SnapshotError),
         (lambda: tl.Scene.load(path), tl.SceneError),
         (lambda: tl.Scene().add_urdf(path), tl.UrdfError),
+        (lambda: tl.Scene().add_mujoco(path), tl.SceneError),
+        (lambda: tl.Scene().add_hfield(path, size=(1, 1), base=1), tl.SceneError),
     ]
     for read, error in readers:
         with pytest.raises(error, match=r"not a file|no file|Is a directory") as caught:
@@ -137,6 +140,22 @@ def test_a_snapshot_is_not_read_to_find_out_that_it_is_none(tmp_path):
         file.truncate(1 << 37)
     with pytest.raises(tl.SnapshotError, match="larger than the limit of 64 GiB"):
         tl.Snapshot.load(path)
+
+
+def test_a_height_field_beyond_the_limit_is_neither_read_nor_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    sparse = tmp_path / "sparse.npy"
+    np.save(sparse, np.zeros((2, 2)))
+    with sparse.open("r+b") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(tl.SceneError, match="larger than the limit of 128 MiB") as caught:
+        tl.Scene().add_hfield(sparse, size=(1, 1), base=1)
+    assert str(sparse) in str(caught.value)
+    # of one number that is repeated: neither copied nor written to find out
+    large = np.broadcast_to(np.float64(0), (1 << 20, 1 << 20))
+    with pytest.raises(tl.SceneError, match="has 1099511627776 elevations, more than 16777216; make it coarser"):
+        tl.Scene().add_hfield(large, size=(1, 1), base=1)
+    assert not (tmp_path / "cache").exists()
 
 
 SAVE = """

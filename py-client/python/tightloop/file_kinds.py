@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
+
+from tightloop import named_files
 
 # The first element of a robot file begins within so many bytes.
 _HEAD_BYTES = 1 << 16
@@ -52,9 +55,7 @@ def root_element(text: str) -> str | None:
 def element_of(path: Path) -> str | None:
     """Return the name of a file's first element; None for what is no file or no XML."""
     try:
-        if not path.is_file():
-            return None
-        with path.open("rb") as file:
+        with named_files.opened("a file", path, ValueError, limit=sys.maxsize) as file:
             return root_element(file.read(_HEAD_BYTES).decode("utf-8-sig", errors="replace"))
     except (OSError, ValueError):  # an option's value that is too long for a path, or a file that Rust reports
         return None

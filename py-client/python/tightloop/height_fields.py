@@ -5,32 +5,47 @@ from __future__ import annotations
 import hashlib
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop import cache_files, named_files
 from tightloop.errors import SceneError
-from tightloop.mujoco.export import cache_folder
 from tightloop.whole_files import whole_file
+
+#: Most elevations of a field; `sim-core/model/src/geometry/height_field.rs` has the same limit.
+SAMPLES_MAX = 1 << 24
+#: Most bytes of a file: its elevations in double precision, and a head.
+_FILE_MAX = 8 * SAMPLES_MAX + (1 << 16)
 
 
 def elevations(what: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return elevations [m] as float64, shape ``(rows, columns)``.
 
     Raises:
-        SceneError: They are no array with two axes, too few, or not finite.
+        SceneError: They are no array with two axes, too few or too many, or not finite.
     """
+    # what is too large is not converted to find out
+    _check_shape(what, getattr(values, "shape", None))
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise SceneError(f"{what} is {type(values).__name__}; give an array of elevations, or a .npy file") from None
-    if array.ndim != 2 or min(array.shape) < 2:
-        raise SceneError(f"{what} has shape {array.shape}; give (rows, columns), at least two of each")
+    _check_shape(what, array.shape)
     if not np.isfinite(array).all():
         place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
         raise SceneError(f"{what} is {array[place]} at {place}; give finite elevations [m]")
     return np.ascontiguousarray(array)
+
+
+def _check_shape(what: str, shape: tuple[int, ...] | None) -> None:
+    if shape is None:
+        return
+    if len(shape) != 2 or min(shape) < 2:
+        raise SceneError(f"{what} has shape {shape}; give (rows, columns), at least two of each")
+    if shape[0] * shape[1] > SAMPLES_MAX:
+        count = shape[0] * shape[1]
+        raise SceneError(f"{what} has {count} elevations, more than {SAMPLES_MAX}; make it coarser or smaller")
 
 
 def checked(what: str, path: Path) -> Path:
@@ -40,9 +55,12 @@ def checked(what: str, path: Path) -> Path:
         SceneError: The file cannot be read, or has no such elevations.
     """
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError) as error:
+        with named_files.opened("a file that numpy.save wrote", path, SceneError, limit=_FILE_MAX) as file:
+            array = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
         raise SceneError(f"{what}: {path}: {error}; give a file that numpy.save wrote") from None
+    if not isinstance(array, np.ndarray):
+        raise SceneError(f"{what}: {path} has several arrays; give a file that numpy.save wrote")
     if array.dtype not in (np.dtype("<f4"), np.dtype("<f8")) or not array.flags.c_contiguous:
         raise SceneError(f"{what}: {path} has {array.dtype}; save elevations as float32 or float64, in C order")
     elevations(f"{what}: {path}", array)
@@ -52,19 +70,16 @@ def checked(what: str, path: Path) -> Path:
 def cached(array: NDArray[np.float64]) -> Path:
     """Write elevations to a file in the user's cache, named by their content, and return the file.
 
-    The file stays, because recordings and running daemons refer to it.
+    Raises:
+        SceneError: The file cannot be written.
     """
+
+    def write(part: Path) -> None:
+        with part.open("wb") as file:
+            np.save(file, array)
+
     digest = hashlib.sha256(str(array.shape).encode() + array.tobytes()).hexdigest()
-    folder = cache_folder().with_name("height_fields")
-    path = folder / f"{digest[:32]}.npy"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not path.is_file():
-            _save(path, array)
-    except OSError as error:
-        message = f"{folder}: elevations cannot be kept there: {error}; set XDG_CACHE_HOME to a folder"
-        raise SceneError(message) from error
-    return path
+    return cache_files.keep("height_fields", f"{digest[:32]}.npy", write)
 
 
 def keep_beside(scene_file: Path, name: str, source: Path) -> Path:
@@ -79,9 +94,3 @@ def keep_beside(scene_file: Path, name: str, source: Path) -> Path:
     except OSError as error:
         raise SceneError(f"save: height field `{name}` cannot be written to {kept}: {error}") from error
     return kept
-
-
-def _save(path: Path, array: NDArray[Any]) -> None:
-    # another process may write the same file
-    with whole_file(path) as part, part.open("wb") as file:
-        np.save(file, array)

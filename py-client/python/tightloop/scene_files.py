@@ -77,16 +77,12 @@ def scene_file(argument: str) -> str:
     kind = kind_of(Path(argument))
     if kind is None:
         return argument
-    from tightloop.mujoco.export import cache_folder
-    from tightloop.whole_files import whole_file
+    from tightloop import cache_files
 
     with _said():
         text = scene_of(Path(argument)).to_toml()
-        folder = cache_folder().with_name("scenes")
-        folder.mkdir(parents=True, exist_ok=True)
-        file = folder / f"{Path(argument).stem}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
-        with whole_file(file) as part:
-            part.write_text(text, encoding="utf-8")
+        name = f"{Path(argument).stem}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
+        file = cache_files.keep("scenes", name, lambda part: part.write_text(text, encoding="utf-8"))
     return str(file)
 
 

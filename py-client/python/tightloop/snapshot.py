@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import stat
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import checks, system
+from tightloop import checks, named_files, system
 from tightloop.errors import SnapshotError
 from tightloop.signatures import checked_calls
 from tightloop.whole_files import whole_file
@@ -198,14 +197,9 @@ def _no_room(reason: object) -> SnapshotError:
 
 def _read(file: Path) -> bytes:
     """Return the bytes of a regular file that begins as a snapshot does, or the beginning of another one."""
-    with system.open_without_waiting(file) as source:
-        found = os.fstat(source.fileno())
-        if not stat.S_ISREG(found.st_mode):
-            raise SnapshotError(f"{file}: is no file; give the file of a snapshot")
-        if found.st_size > _BYTES_MAX:
-            raise SnapshotError(f"{file}: is larger than the limit of {_BYTES_MAX >> 30} GiB; give a snapshot")
+    with named_files.opened("a snapshot", file, SnapshotError, limit=_BYTES_MAX) as source:
         head = source.read(_HEAD.size)
-        return head + source.read(found.st_size) if head.startswith(_MAGIC) else head
+        return head + source.read() if head.startswith(_MAGIC) else head
 
 
 def _check(data: bytes, origin: str) -> tuple[int, int, int]:

@@ -169,17 +169,6 @@ def cure_of_full_exchange() -> str:
     return "make room in the temporary folder, or set TMPDIR to one that has room"
 
 
-def open_without_waiting(path: Path) -> IO[bytes]:
-    """Open a file to read; a pipe without a writer is not waited for.
-
-    Raises:
-        OSError: The file cannot be opened.
-    """
-    if sys.platform == "win32":
-        return path.open("rb")
-    return open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY))
-
-
 def write_to_disk(path: Path) -> None:
     """Wait until the contents of a file survive a power cut.
 

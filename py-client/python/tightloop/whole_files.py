@@ -6,6 +6,7 @@ most the hidden file, ``.tightloop-…``.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import secrets
@@ -41,7 +42,8 @@ class WholeFile:
         self._end = weakref.finalize(self, _remove, self.part, os.getpid())
         with self.writing():
             os.close(os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _NEW_MODE))
-            if self._place.exists():
+            # it may go meanwhile
+            with contextlib.suppress(FileNotFoundError):
                 self.part.chmod(self._place.stat().st_mode & 0o777)
 
     @contextmanager

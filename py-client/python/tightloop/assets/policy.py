@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop import named_files
 from tightloop.errors import ArgumentError
 
+#: Most bytes of a policy.
+_FILE_MAX = 1 << 30
 _CLIP = 10.0  # of normalised observations, as in training
 
 
@@ -21,7 +24,10 @@ class Policy:
     """
 
     def __init__(self, path: Path) -> None:
-        with np.load(path) as arrays:
+        with (
+            named_files.opened("a policy", Path(path), ArgumentError, limit=_FILE_MAX) as file,
+            np.load(file, allow_pickle=False) as arrays,
+        ):
             self._mean, self._scale = arrays["mean"], arrays["scale"]
             layers = sum(name.startswith("weight") for name in arrays)
             self._layers = [(arrays[f"weight{layer}"], arrays[f"bias{layer}"]) for layer in range(layers)]

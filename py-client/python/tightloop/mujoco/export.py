@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import advice
+from tightloop import advice, cache_files, named_files
 from tightloop.errors import SceneError
 from tightloop.file_kinds import instead, kind_of_file
 from tightloop.mujoco import textures
@@ -25,6 +25,8 @@ from tightloop.whole_files import whole_file
 FORMAT = 1
 #: Versions of MuJoCo whose models are read: at least this one, and below the other.
 VERSIONS = ((3, 11), (4, 1))
+#: Most bytes of an MJCF file.
+_XML_MAX = 1 << 28
 _INSTALL = (
     'models from MuJoCo need `{}`: run `pip install "./py-client[mujoco]"` in the repository, or '
     '`pip install "FILE.whl[mujoco]"` from a wheel'
@@ -121,8 +123,9 @@ def compiled(model: Any) -> Any:
             if wrong is not None and not is_robot:
                 raise SceneError(wrong)
             path = Path(model)
-            if not path.is_file():
+            if not path.exists():
                 raise SceneError(f"{path}: there is no such file; give the path of an MJCF file")
+            named_files.check("an MJCF file", path, SceneError, limit=_XML_MAX)
             try:
                 found = mujoco.MjModel.from_xml_path(str(path))
             except ValueError:
@@ -132,6 +135,8 @@ def compiled(model: Any) -> Any:
             if is_robot:
                 advice.warn(f"{wrong} with its drives, limits and packages; MuJoCo compiles it without drives")
             return found
+    except OSError as error:
+        raise SceneError(f"{model}: cannot be read: {error.strerror}; give the path of an MJCF file") from error
     except (ValueError, RuntimeError) as error:
         where = f"{model}: " if isinstance(model, str | os.PathLike) else ""
         raise SceneError(f"{where}MuJoCo cannot compile it: {error}") from error
@@ -191,44 +196,31 @@ def export(model: Any, path: str | os.PathLike[str]) -> None:
         OutputError: The file cannot be written.
         MissingLibrary: The package ``mujoco`` is not installed.
     """
-    _save(arrays(compiled(model)), Path(path))
-
-
-def cache_folder() -> Path:
-    """Return the folder of exported models and generated scene files in the user's cache; it may not exist yet."""
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(home) / "tightloop" / "mujoco"
+    found = _bytes(arrays(compiled(model)))
+    with whole_file(Path(path)) as part:
+        part.write_bytes(found)
 
 
 def cached(model: Any) -> Path:
     """Write an ``MjModel`` to a file in the user's cache, named by its content, and return the file.
 
-    The file stays, because recordings and running daemons refer to it.
+    Raises:
+        SceneError: MuJoCo cannot compile the model, or the file cannot be written.
+        MissingLibrary: The package ``mujoco`` is not installed.
     """
     found = arrays(compiled(model))
     digest = hashlib.sha256()
     for name in sorted(found):
         digest.update(f"{name} {found[name].dtype} {found[name].shape}\n".encode())
         digest.update(found[name].tobytes())
-    folder = cache_folder()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{digest.hexdigest()[:32]}.safetensors"
-        if not path.is_file():
-            _save(found, path)
-    except OSError as error:
-        raise SceneError(
-            f"{folder}: the model cannot be kept there: {error}; set XDG_CACHE_HOME to a folder"
-        ) from error
-    return path
+    name = f"{digest.hexdigest()[:32]}.safetensors"
+    return cache_files.keep("mujoco", name, lambda part: part.write_bytes(_bytes(found)))
 
 
-def _save(found: dict[str, NDArray[Any]], path: Path) -> None:
+def _bytes(found: dict[str, NDArray[Any]]) -> bytes:
     from safetensors.numpy import save
 
-    # another process may write the same file
-    with whole_file(path) as part:
-        part.write_bytes(save(found))
+    return save(found)
 
 
 def _hulls(model: Any) -> dict[str, NDArray[Any]]:

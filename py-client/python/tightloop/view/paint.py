@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop import named_files
+
 Color = tuple[int, int, int, int]
 Colors = NDArray[np.uint8]
 
@@ -24,6 +26,8 @@ _STEEP = (8.0, 25.0, 45.0)
 _TONES = ((1.0, 0.93), (0.92, 0.86), (0.78, 0.78), (0.66, 0.66))
 # Hues that follow one another by the golden angle are well apart.
 _GOLDEN = 137.507764 / 360
+# Most bytes of an image file
+_IMAGE_MAX = 1 << 30
 
 
 def palette(number: int) -> tuple[int, int, int, int]:
@@ -75,8 +79,7 @@ def open_image(path: str | Path) -> Any:
     """
     from PIL import Image
 
-    if Path(path).exists() and not Path(path).is_file():
-        raise OSError("it is not a file")
+    named_files.check("an image", Path(path), OSError, limit=_IMAGE_MAX)
     return Image.open(path)
 
 
