@@ -1,10 +1,11 @@
 //! Convex pieces of the shapes of a scene, and the pairs of pieces that may touch.
 
 use super::carrier::Carrier;
-use crate::description::{ContactPair, Description, MujocoParts};
+use crate::description::{ContactPair, Description, Joint, MujocoParts, Robot};
 use crate::geom_contact::GeomContact;
 use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
+use crate::joint_kind::JointKind;
 use crate::pose::Pose;
 use crate::surface::Surface;
 use sim_physics::constants::Constants;
@@ -28,6 +29,8 @@ pub(super) struct PlacedShape<'a> {
     pub place: usize,
     /// Its robot, if it is not static.
     pub robot: Option<usize>,
+    /// The first link of the part of its robot that it belongs to.
+    pub part: usize,
     /// Its link, as a frame.
     pub link: Option<usize>,
     /// The body that it moves with.
@@ -108,6 +111,7 @@ pub(super) fn placed_shapes<'a>(
             own_link: 0,
             place: 0,
             robot: None,
+            part: 0,
             link: None,
             body: None,
             group: constants.bodies.len() + scene.robots.len(),
@@ -133,6 +137,7 @@ pub(super) fn placed_shapes<'a>(
                     own_link: link,
                     place,
                     robot: Some(index),
+                    part: part(robot, &carriers[index], link),
                     link: Some(frame),
                     body: carrier.body,
                     group: group(constants, index, carrier),
@@ -145,6 +150,26 @@ pub(super) fn placed_shapes<'a>(
     all
 }
 
+/// Whether a joint lets its link move away from a link that stands still: then the two are as two robots.
+fn parts_from_fixed(joint: &Joint, carriers: &[Carrier]) -> bool {
+    let stands = joint
+        .parent
+        .is_some_and(|parent| carriers[parent].body.is_none());
+    stands && matches!(joint.kind, JointKind::Free | JointKind::Planar)
+}
+
+/// The first link of the part of a robot that a link belongs to.
+fn part(robot: &Robot, carriers: &[Carrier], link: usize) -> usize {
+    let mut first = link;
+    while let Some(joint) = robot.joints.iter().find(|joint| joint.child == first)
+        && !parts_from_fixed(joint, carriers)
+        && let Some(parent) = joint.parent
+    {
+        first = parent;
+    }
+    first
+}
+
 /// Groups of links that a joint connects.
 pub(super) fn connected(
     scene: &Description,
@@ -154,7 +179,8 @@ pub(super) fn connected(
     let mut pairs = Vec::new();
     for (index, robot) in scene.robots.iter().enumerate() {
         let of = |link: usize| group(constants, index, &carriers[index][link]);
-        for joint in robot.joints.iter().filter(|joint| joint.moves()) {
+        let holds = |joint: &&Joint| joint.moves() && !parts_from_fixed(joint, &carriers[index]);
+        for joint in robot.joints.iter().filter(holds) {
             if let Some(parent) = joint.parent {
                 pairs.push((of(parent), of(joint.child)));
             }
@@ -321,7 +347,7 @@ fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> boo
         return moves && passes && first.meets(&second);
     }
     let is_one = a.group == b.group;
-    let of_one_robot = a.robot.is_some() && a.robot == b.robot;
+    let of_one_robot = a.robot.is_some() && a.robot == b.robot && a.part == b.part;
     let may_self = a.robot.is_some_and(|robot| rules.self_collisions[robot]);
     let neighbours = [(a.group, b.group), (b.group, a.group)];
     let connected = neighbours

@@ -259,3 +259,53 @@ fn static_mesh_comes_from_a_file() {
     assert_says(&message, &[file.to_str().unwrap()]);
     assert_eq!(scene, before);
 }
+
+/// A floor and a post that are fixed to the root, and two balls on joints of a kind below it; a hand hangs from the first.
+fn with_floor(kind: &str, self_collisions: bool) -> BTreeSet<[String; 2]> {
+    let ball = INERTIAL.to_owned() + &collision("s");
+    let axis = "<axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/>";
+    let robot = link("base", "")
+        + &link("floor", &collision("s"))
+        + &joint("holds", "fixed", "base", "floor", "")
+        + &link("a", &ball)
+        + &joint("left", kind, "base", "a", axis)
+        + &link("b", &ball)
+        + &joint("right", kind, "base", "b", axis)
+        + &link("hand", &ball)
+        + &joint("wrist", "continuous", "a", "hand", "<axis xyz=\"0 0 1\"/>");
+    let mut scene = Description::new(1.0 / 480.0, 8);
+    scene.robots.push(read(&robot).unwrap());
+    scene.robots[0].self_collisions = self_collisions;
+    let names = scene.shape_names();
+    let model = scene.compile().unwrap();
+    let pairs = model.constants().contacts.pairs.iter();
+    let name = |shape: usize| names[shape].split('/').nth(1).unwrap().to_owned();
+    pairs
+        .map(|pair| {
+            let mut pair = pair.shapes.map(name);
+            pair.sort();
+            pair
+        })
+        .collect()
+}
+
+#[test]
+fn what_leaves_a_fixed_link_touches_it_as_another_robot_would() {
+    let pairs = |names: &[[&str; 2]]| -> BTreeSet<[String; 2]> {
+        names.iter().map(|pair| pair.map(str::to_owned)).collect()
+    };
+    let apart = [["a", "floor"], ["b", "floor"], ["a", "b"]];
+    let of_hand = [["floor", "hand"], ["b", "hand"]];
+    let all = pairs(&[&apart[..], &of_hand].concat());
+    for kind in ["floating", "planar"] {
+        for self_collisions in [false, true] {
+            assert_eq!(with_floor(kind, self_collisions), all, "{kind}");
+        }
+    }
+    // a joint that holds its link to the fixed one makes them neighbours
+    for kind in ["continuous", "prismatic"] {
+        assert_eq!(with_floor(kind, false), pairs(&[]), "{kind}");
+        let apart = [["a", "b"], ["floor", "hand"], ["b", "hand"]];
+        assert_eq!(with_floor(kind, true), pairs(&apart), "{kind}");
+    }
+}
