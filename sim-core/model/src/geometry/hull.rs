@@ -1,7 +1,7 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
-use super::polytope::{NoHull, triangles_around_stretched};
-use super::stretch::stretched;
+use super::polytope::triangles_around_stretched;
+use super::stretch::{NoHull, stretched};
 use super::vector::{
     Vector, add, area_vector, dot, extent, longest, norm, scale, six_volumes, size, sub, unit,
 };

@@ -1,7 +1,7 @@
 //! Triangles around points: parry3d's hull of all of them, or of the few farthest out.
 
 use super::parry;
-use super::stretch::{Stretched, stretched};
+use super::stretch::{NoHull, Stretched, stretched};
 use super::vector::{Vector, add, area_vector, dot, extent, longest, norm, scale, size, sub, unit};
 
 /// Most work on points that a thinned cloud lacks [points times triangles]: a second.
@@ -14,23 +14,6 @@ const POINTS_MAX: usize = 4096;
 const DIRECTIONS: usize = 22;
 /// Points nearer to the hull than this are left out where the number of vertices is limited, relative to the size.
 const TOLERANCE: f64 = 1e-6;
-
-/// Why points have no hull.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum NoHull {
-    /// Fewer than three, all at one place or on a line, or not finite.
-    #[error("its vertices lie on a line")]
-    Thin,
-    /// In one plane; a [`super::Hull`] is a plate then.
-    #[error("it lies in a plane")]
-    Flat {
-        /// Unit normal of the plane [–].
-        normal: [f64; 3],
-    },
-    /// A hull that rounding keeps from being closed and convex.
-    #[error("its convex hull cannot be computed")]
-    Failed,
-}
 
 /// Triangles of the hull of points, counter-clockwise from outside, as indices of the points; with at most `vertices_max`
 /// corners, those farthest out.

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use super::polytope::NoHull;
 use super::vector::{Vector, add, area_vector, cross, dot, norm, scale, size, sub, unit};
 
 /// Points with less extent than this, relative to the largest extent, count as one point, a line or a flat sheet. Rounding
@@ -11,6 +10,23 @@ const FLAT: f64 = 1e-9;
 /// Extent to which thin directions are stretched, relative to the largest: parry3d is exact there, and tolerances of hulls
 /// are small shares of the thickness. What is thicker is left as it is.
 const STRETCHED: f64 = 1e-2;
+
+/// Why points have no hull.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoHull {
+    /// Fewer than three, all at one place or on a line, or not finite.
+    #[error("its vertices lie on a line")]
+    Thin,
+    /// In one plane; a [`super::Hull`] is a plate then.
+    #[error("it lies in a plane")]
+    Flat {
+        /// Unit normal of the plane [–].
+        normal: [f64; 3],
+    },
+    /// A hull that rounding keeps from being closed and convex.
+    #[error("its convex hull cannot be computed")]
+    Failed,
+}
 
 /// Points in which every direction has an extent that counts.
 pub(super) struct Stretched<'a> {
