@@ -14,7 +14,7 @@ mod wrap;
 use serde_json::json;
 use sim_engine::dynamics::Dynamics;
 use sim_model::geometry::{MeshOptions, triangles};
-use sim_model::{ModelError, MujocoContents, Pose, Shape};
+use sim_model::{Joint, ModelError, MujocoContents, Pose, Shape};
 
 use crate::cli::Inspect;
 use crate::config::hull_sides;
@@ -136,6 +136,9 @@ fn drawing(properties: &Properties, frames: &[f64], args: &Inspect) -> Drawing {
     let mut caption = match &args.joint_q {
         Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
         None if robot.mujoco.is_some() => "at the start".to_owned(),
+        None if robot.joints.iter().any(starts_elsewhere) => {
+            "joint_q = 0, mimic joints with their leaders".to_owned()
+        }
         None => "joint_q = 0".to_owned(),
     };
     match outside.as_slice() {
@@ -175,4 +178,9 @@ fn commas(values: &[f64]) -> String {
         .map(f64::to_string)
         .collect::<Vec<_>>()
         .join(",")
+}
+
+/// Whether a mimic joint is not at 0 where its leader is.
+fn starts_elsewhere(joint: &Joint) -> bool {
+    joint.mimic.is_some_and(|mimic| mimic.position(0.0) != 0.0)
 }
