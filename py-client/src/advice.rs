@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use pyo3::prelude::*;
-use sim_protocol::{Command, Description};
+use sim_protocol::{Command, Description, RobotRange};
 
 use crate::followers::Followers;
 use crate::frame::PyFrame;
@@ -438,24 +438,38 @@ fn aimless<'a>(
 fn of_targets(description: &Description, field: &str, dofs: &Range<usize>) -> String {
     let robots = description.robots.iter();
     let own = robots.filter(|robot| robot.dofs[0] < dofs.end && dofs.start < robot.dofs[1]);
-    let (models, others): (Vec<_>, Vec<_>) =
-        own.partition(|robot| robot.actuators[0] < robot.actuators[1]);
+    let (models, others): (Vec<&RobotRange>, Vec<&RobotRange>) =
+        own.partition(|robot| robot.is_mujoco);
     let gains = match field {
         "joint_target_q" => "joint_target_ke and joint_target_kd",
         _ => "joint_target_kd, and joint_target_mode \"velocity\" or \"both\",",
     };
-    let cure = match others.is_empty() {
-        true => "actuators of a MuJoCo model follow ctrl".to_owned(),
-        false => format!("set {gains} of the robot before launch, or send joint_f"),
-    };
+    let is_still = |model: &&RobotRange| model.actuators[0] == model.actuators[1];
+    let still = models.iter().copied().find(is_still);
+    let mut cures = Vec::new();
+    if !others.is_empty() {
+        cures.push(format!(
+            "set {gains} of the robot before launch, or send joint_f"
+        ));
+    } else if !models.iter().all(is_still) {
+        cures.push("actuators of a MuJoCo model follow ctrl".to_owned());
+    }
+    if let Some(model) = still {
+        cures.push(format!(
+            "model `{0}` from MuJoCo has no actuators: call scene.models[\"{0}\"].add_position_actuators(stiffness=…, damping=…) \
+             before launch and send ctrl, or send joint_f",
+            model.name
+        ));
+    }
     let names: Vec<_> = others
         .iter()
         .chain(&models)
         .map(|robot| format!("`{}`", robot.name))
         .collect();
     format!(
-        "{field} has no effect, since no drive of {} follows it: {cure}",
-        names.join(", ")
+        "{field} has no effect, since no drive of {} follows it: {}",
+        names.join(", "),
+        cures.join("; ")
     )
 }
 

@@ -156,6 +156,10 @@ pub(crate) fn description(
                 coords: [robot.coords.start, robot.coords.end],
                 bodies: [robot.bodies.start, robot.bodies.end],
                 actuators: [robot.actuators.start, robot.actuators.end],
+                is_mujoco: {
+                    let mut models = info.scene.robots.iter();
+                    models.any(|own| own.name == robot.name && own.mujoco.is_some())
+                },
             })
             .collect(),
         followers: {

@@ -134,6 +134,11 @@ CALLS: dict[str, Call] = {
     "Robot.order": Call(lambda world: world.scene().robots["arm"].order, {"names": "order"}),
     "JointOrder.read": Call(lambda world: world.order.read, {"values": "ordered"}),
     "JointOrder.write": Call(lambda world: world.order.write, {"values": "ordered"}),
+    "Robot.add_position_actuators": Call(
+        lambda world: world.scene().robots["arm"].add_position_actuators,
+        {"joints": "joint names", "stiffness": "positive", "damping": "least 0", "effort_limit": "positive or inf"},
+        {"stiffness": 1.0, "damping": 1.0},
+    ),
     "Robot.link": Call(lambda world: world.scene().robots["arm"].link, {"name": "link"}),
     "Uniform": Call(lambda _: tl.Uniform, {"low": "number", "high": "number"}, {"low": 0.0, "high": 1.0}),
     "Normal": Call(lambda _: tl.Normal, {"mean": "number", "std": "least 0"}, {"mean": 0.0, "std": 1.0}),

@@ -52,6 +52,7 @@ LAYERS = (
     ("tightloop.mujoco",),
     # what a scene is made of
     (
+        "tightloop.actuated_joints",
         "tightloop.body",
         "tightloop.distributions",
         "tightloop.entity",

@@ -89,6 +89,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "number": FINITE,
     "positive": (*FINITE, 0.0, -1.0),
     "least 0": (*FINITE, -1.0),
+    "positive or inf": (*NUMBER, 0.0, -1.0, -INF),
     "at least 0 or inf": (*NUMBER, -1.0, -INF),
     "count": COUNT,
     "optional count": COUNT,
@@ -107,6 +108,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "label": ("", "a b", "a/b", 3, b"x", [], "ä", THING, 1.5),
     "text": TEXT,
     "names": NAMES,
+    "joint names": ("nowhere", "(", "", 3, b"x", [], [3], ["fr3_joint1", "nowhere"], None, THING),
     # the daemon knows which there are
     "list of names": NAMES[:4],
     "choice": ("nonsense", 3, [], "", THING, 1.5, b"max"),

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tightloop import _core
+from tightloop.actuated_joints import chosen, gains
 from tightloop.checks import Vector
 from tightloop.entity import Entity
+from tightloop.errors import SceneError, UnknownAttribute
+from tightloop.mujoco import position_actuators
+from tightloop.signatures import checked_calls
 
 
+@checked_calls
 class MujocoModel(Entity):
     """A MuJoCo model in a scene; `Scene.add_mujoco` returns it.
 
@@ -80,6 +89,51 @@ class MujocoModel(Entity):
         """The model's ``dt``, ``gravity`` and ``solver``, as a scene has them."""
         return dict(self._summary["options"])
 
+    def add_position_actuators(
+        self,
+        joints: str | Sequence[str] = ".*",
+        *,
+        stiffness: float,
+        damping: float,
+        effort_limit: float | None = None,
+    ) -> list[str]:
+        """Give hinges and slides position actuators, such as those of a file that has none.
+
+        Each is MuJoCo's ``<position>`` with ``kp`` and ``kv``: ``force = stiffness * (ctrl - q) - damping * qd``. It
+        has the name of its joint, and its control is clamped to the range of the joint. As in MuJoCo, controls are 0 at
+        the start. After a reset to a keyframe, they are the positions of the joints there.
+
+        Args:
+            joints: Names of joints, or regular expressions for whole names.
+            stiffness: Gain of each [N·m/rad or N/m].
+            damping: Damping of each [N·m·s/rad or N·s/m].
+            effort_limit: Largest force of each [N·m or N]; no limit if left out.
+
+        Returns:
+            The names of the new actuators; commands have the model's name before them, ``model/joint``.
+
+        Raises:
+            SceneError: No joint matches, a joint has an actuator already, or a value is wrong.
+            MissingLibrary: The extra ``mujoco`` is not installed.
+        """
+        subject = self._subject()
+        stiffness, damping, limit = gains(subject, stiffness, damping, effort_limit)
+        places = {self.dof_names[dof]: joint for dof, joint in position_actuators.joints_of(self.file).items()}
+        names = chosen(subject, joints, list(places), ())
+        driven = position_actuators.driven_joints(self.file)
+        for name in names:
+            if places[name] in driven or name in self.actuator_names:
+                raise SceneError(
+                    f"{subject}: add_position_actuators: joint `{name}` has an actuator already; command "
+                    "it by `ctrl`, and name the other joints here"
+                )
+        own = {places[name]: name for name in names}
+        file = position_actuators.added(self.file, own, stiffness, damping, math.inf if limit is None else limit)
+        self._summary = json.loads(_core.read_mujoco(str(file), self.mesh_max_hull_vertices))
+        self.file = file
+        self._changed("add_position_actuators")
+        return names
+
     def table(self) -> dict[str, Any]:
         """Return the model as a table of a scene file."""
         return {
@@ -89,6 +143,14 @@ class MujocoModel(Entity):
             "quat": self.quat,
             "mesh_max_hull_vertices": self.mesh_max_hull_vertices,
         }
+
+    def _refused(self, name: str) -> UnknownAttribute:
+        if name.startswith("joint_target"):
+            return UnknownAttribute(
+                f"{self._subject()} has no attribute {name!r}, since its actuators drive it; "
+                "`add_position_actuators` adds some"
+            )
+        return super()._refused(name)
 
     def __repr__(self) -> str:
         dofs, actuators = len(self.dof_names), len(self.actuator_names)

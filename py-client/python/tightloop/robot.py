@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import checks
+from tightloop.actuated_joints import chosen, gains
 from tightloop.attributes import suggestion
 from tightloop.checks import Vector
 from tightloop.entity import Entity
@@ -254,6 +255,42 @@ class Robot(Entity):
             ball = next(name for name in coords if name not in dofs)
             raise SceneError(f"robot `{self.name}`: order: `{ball}` has no dof of its own; order its columns by hand")
         return JointOrder(self.name, names, dofs, base)
+
+    def add_position_actuators(
+        self,
+        joints: str | Sequence[str] = ".*",
+        *,
+        stiffness: float,
+        damping: float,
+        effort_limit: float | None = None,
+    ) -> list[str]:
+        """Give joints drives that follow ``joint_target_q``: ``stiffness * (target - q) - damping * qd``.
+
+        It sets ``joint_target_ke``, ``joint_target_kd``, ``joint_target_mode`` and ``joint_effort_limit`` of them. A
+        mimic joint, which its leader moves, gets a drive by its own name alone.
+
+        Args:
+            joints: Names of dofs, or regular expressions for whole names.
+            stiffness: Gain of each [N·m/rad or N/m].
+            damping: Damping of each [N·m·s/rad or N·s/m].
+            effort_limit: Largest force of each [N·m or N]; that of the file if left out.
+
+        Returns:
+            The names of these dofs.
+
+        Raises:
+            SceneError: No joint matches, or a value is wrong.
+        """
+        subject = self._subject()
+        stiffness, damping, limit = gains(subject, stiffness, damping, effort_limit)
+        driven = [name for name, is_driven in zip(self.dof_names, self.dof_driven, strict=True) if is_driven]
+        names = chosen(subject, joints, driven, self.joint_leaders)
+        self.joint_target_ke = dict.fromkeys(names, stiffness)
+        self.joint_target_kd = dict.fromkeys(names, damping)
+        self.joint_target_mode = dict.fromkeys(names, "position")
+        if limit is not None:
+            self.joint_effort_limit = dict.fromkeys(names, limit)
+        return names
 
     @property
     def notes(self) -> list[str]:

@@ -220,6 +220,9 @@ pub struct RobotRange {
     /// Its actuators. Older recordings have none.
     #[serde(default)]
     pub actuators: [usize; 2],
+    /// Whether it is a model from MuJoCo, which has no drives but actuators.
+    #[serde(default)]
+    pub is_mujoco: bool,
 }
 
 /// A joint that follows another one: q = offset + multiplier · q of the leader.

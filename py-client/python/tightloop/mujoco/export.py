@@ -27,7 +27,8 @@ FORMAT = 1
 VERSIONS = ((3, 11), (4, 1))
 #: Most bytes of an MJCF file.
 _XML_MAX = 1 << 28
-_INSTALL = (
+#: What to install, for messages; `{}` is a package.
+INSTALL = (
     'models from MuJoCo need `{}`: run `pip install "./py-client[mujoco]"` in the repository, or '
     '`pip install "FILE.whl[mujoco]"` from a wheel'
 )
@@ -106,8 +107,8 @@ def compiled(model: Any) -> Any:
         SceneError: MuJoCo cannot read or compile it; the message is MuJoCo's.
         MissingLibrary: The package ``mujoco`` is not installed.
     """
-    mujoco = optional_import("mujoco", _INSTALL)
-    optional_import("safetensors.numpy", _INSTALL)
+    mujoco = optional_import("mujoco", INSTALL)
+    optional_import("safetensors.numpy", INSTALL)
     version = tuple(int(part) for part in mujoco.__version__.split(".")[:2])
     if not VERSIONS[0] <= version < VERSIONS[1]:
         least, end = (".".join(map(str, version)) for version in VERSIONS)
@@ -148,7 +149,7 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     import mujoco
 
     found: dict[str, NDArray[Any]] = {"format": np.array([FORMAT], np.int32)}
-    found["mujoco_version"] = _texts([mujoco.__version__])
+    found["mujoco_version"] = as_bytes([mujoco.__version__])
     for name in _ARRAYS:
         found[name] = _plain(getattr(model, name))
     for name in _NEWER_ARRAYS:
@@ -159,15 +160,15 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         values = np.asarray(getattr(model, name)).astype(int)
         used = sorted(set(values.tolist()))
         found[name] = np.array([used.index(value) for value in values], np.int32)
-        found[f"{name}.names"] = _texts([members[value] for value in used])
+        found[f"{name}.names"] = as_bytes([members[value] for value in used])
     text = bytes(model.names)
     for kind, count in _NAMED.items():
         short = {"joint": "jnt", "equality": "eq"}.get(kind, kind)
         starts = getattr(model, f"name_{short}adr")
         own = [text[start : text.index(b"\0", start)].decode(errors="replace") for start in starts]
         assert len(own) == getattr(model, count)
-        found[f"names.{kind}"] = _texts(own)
-    found["names.model"] = _texts([text[: text.index(b"\0")].decode(errors="replace")])
+        found[f"names.{kind}"] = as_bytes(own)
+    found["names.model"] = as_bytes([text[: text.index(b"\0")].decode(errors="replace")])
     found |= _hulls(model)
     found["mat_texture_mean"] = textures.means(model)
     for name in _REAL_OPTIONS:
@@ -175,9 +176,9 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     for name in _COUNT_OPTIONS:
         found[f"opt.{name}"] = np.array([getattr(model.opt, name)], np.int32)
     for name, kind in (("integrator", "mjtIntegrator"), ("cone", "mjtCone"), ("solver", "mjtSolver")):
-        found[f"opt.{name}"] = _texts([getattr(mujoco, kind)(getattr(model.opt, name)).name])
+        found[f"opt.{name}"] = as_bytes([getattr(mujoco, kind)(getattr(model.opt, name)).name])
     flags = [*_flags(mujoco.mjtDisableBit, model.opt.disableflags), *_flags(mujoco.mjtEnableBit, model.opt.enableflags)]
-    found["opt.flags"] = _texts(flags)
+    found["opt.flags"] = as_bytes(flags)
     found["stat.meaninertia"] = np.array([model.stat.meaninertia])
     for name in _COUNTS:
         found[name] = np.array([getattr(model, name)], np.int32)
@@ -208,7 +209,11 @@ def cached(model: Any) -> Path:
         SceneError: MuJoCo cannot compile the model, or the file cannot be written.
         MissingLibrary: The package ``mujoco`` is not installed.
     """
-    found = arrays(compiled(model))
+    return kept(arrays(compiled(model)))
+
+
+def kept(found: dict[str, NDArray[Any]]) -> Path:
+    """Write the arrays of a model to a file in the user's cache, named by its content, and return the file."""
     digest = hashlib.sha256()
     for name in sorted(found):
         digest.update(f"{name} {found[name].dtype} {found[name].shape}\n".encode())
@@ -243,9 +248,14 @@ def _plain(array: Any) -> NDArray[Any]:
     return np.ascontiguousarray(array, dtype=np.float64 if array.dtype.kind == "f" else np.int32)
 
 
-def _texts(texts: list[str]) -> NDArray[np.uint8]:
-    """Texts as bytes, each with a 0 at its end."""
-    return np.frombuffer(b"".join(text.encode() + b"\0" for text in texts), np.uint8)
+def as_bytes(given: list[str]) -> NDArray[np.uint8]:
+    """Return texts as bytes, each with a 0 at its end."""
+    return np.frombuffer(b"".join(text.encode() + b"\0" for text in given), np.uint8)
+
+
+def texts(given: NDArray[np.uint8]) -> list[str]:
+    """Return texts of which `as_bytes` made bytes."""
+    return [text.decode() for text in given.tobytes().split(b"\0")[:-1]]
 
 
 def _flags(kind: Any, value: int) -> list[str]:
