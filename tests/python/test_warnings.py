@@ -47,7 +47,7 @@ def test_a_scene_without_traps_is_not_warned_of(tmp_path):
     scene = tl.Scene()
     scene.add_ground()
     hinge = robot(scene, tmp_path, floating=True)
-    hinge.joint_target_ke, hinge.joint_target_q = 5.0, 0.4
+    hinge.joint_target_ke, hinge.joint_target_kd, hinge.joint_target_q = 5.0, 0.5, 0.4
     hinge.joint_q = [0, 0, 0.5, 0, 0, 0, 1, 0.3]
     scene.add_cube(pos=(1, 0, 0.025))
     scene.randomize(params={"shape_mu": {"ground": tl.Uniform(0.5, 1.5)}})
@@ -135,6 +135,7 @@ def test_targets_of_a_step_that_nothing_follows_are_told_once(tmp_path):
 def test_velocity_targets_of_a_drive_that_holds_positions(tmp_path):
     scene = tl.Scene()
     robot(scene, tmp_path).joint_target_ke = 5.0
+    scene.robots["hinge"].joint_target_kd = 0.5
     with tl.launch(scene, worlds=1) as sim:
         with pytest.warns(tl.TightloopWarning, match="joint_target_qd has no effect.*joint_target_mode"):
             sim.step(joint_target_qd=[1.0])
@@ -232,7 +233,7 @@ def test_what_a_reset_draws_is_checked_as_the_scene_is(tmp_path, drawn, said):
     scene.add_ground()
     robot(scene, tmp_path).pos = (1, 0, 1)
     scene.add_cube(pos=(0, 0, 0.025))
-    usual = {"gravity": {"z": tl.Normal(-9.81, 0.1)}, "body_mass": {"cube": tl.Normal(1.0, 0.1)}}
+    usual = {"gravity": {"z": tl.Normal(-9.81, 0.1)}, "body_mass": {"cube": tl.Normal(0.06, 0.01)}}
     scene.randomize(
         joint_q={"hinge": tl.Uniform(-3, 3)},
         body_q={"cube": {"x": tl.Uniform(-20, 20), "yaw": tl.Uniform(-np.pi, np.pi)}},

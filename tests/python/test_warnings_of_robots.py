@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 
@@ -95,14 +96,32 @@ def test_gravity_as_one_number():
         tl.Scene(gravity=-9.81)
 
 
-def test_gravity_that_points_up():
-    scene = tl.Scene(gravity=(0, 0, 9.81))
-    scene.add_ground()
+@pytest.mark.parametrize(
+    ("gravity", "said"),
+    [
+        ((0, 0, 9.81), r"gravity is \(0, 0, 9\.81\), which points up, .*ceiling, turn it"),
+        ((0.5, 0, 1.0), r"which points up"),
+        ((0, -9.81, 0), r"gravity is \(0, -9\.81, 0\), which acts along the ground"),
+        ((9.81, 0, 0), r"which acts along the ground"),
+        ((0, 0, -981), r"gravity is \(0, 0, -981\), which looks like another unit: it is in m/s²"),
+        ((0, 0, -9810), r"which looks like another unit"),
+        ((0, 0, -1), r"which looks like multiples of 9\.81"),
+    ],
+)
+def test_gravity_with_the_wrong_sign_axis_or_unit(tmp_path, gravity, said):
+    scene = tl.Scene(gravity=gravity)
     scene.add_body(name="ceiling", fixed=True)
-    assert told(scene) == [], "arms may hang from a ceiling"
-    scene.add_cube(pos=(0, 0, 0.025))
+    assert told(scene) == [], "nothing moves"
+    scene.add_urdf(robot(tmp_path, ["arm"]))
     [warning] = told(scene)
-    assert "gravity is (0, 0, 9.81), which points up" in warning and "(0, 0, -9.81)" in warning
+    assert re.search(said, warning) and "(0, 0, -9.81)" in warning, warning
+
+
+@pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, 0, 0), (0, 0, -1.62), (0, 0, -24.8), (1.0, 0, -9.7)])
+def test_gravity_of_planets_slopes_and_none(tmp_path, gravity):
+    scene = tl.Scene(gravity=gravity)
+    scene.add_urdf(robot(tmp_path, ["arm"]))
+    assert told(scene) == []
 
 
 @pytest.mark.parametrize(

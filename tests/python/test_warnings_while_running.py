@@ -294,10 +294,13 @@ def test_parameters_are_looked_at_as_the_scene_is(scene):
             lambda scene, arm: setattr(arm, "joint_target_mode", "both"),
             r"`joint_target_mode`.*set it before the launch",
         ),
-        (lambda scene, arm: setattr(scene, "gravity", (0, 0, -1)), r"Scene: `gravity`.*write sim\.params\.gravity"),
+        (lambda scene, arm: setattr(scene, "gravity", (0, 0, -9)), r"Scene: `gravity`.*write sim\.params\.gravity"),
         (lambda scene, arm: setattr(scene.bodies["cube"], "mass", 2.0), r"body `cube`: `mass`.*sim\.params\.body_mass"),
         (lambda scene, arm: setattr(scene.bodies["cube"], "pos", (0, 0, 2)), r"`pos`.*sim\.write\(joint_q=\{\"cube\""),
-        (lambda scene, arm: scene.add_ground(), r"Scene: `add_ground` changes the scene after the launch"),
+        (
+            lambda scene, arm: scene.add_box(half_extents=(1, 1, 1), pos=(9, 9, 9)),
+            r"Scene: `add_box` changes the scene after the launch",
+        ),
         (lambda scene, arm: scene.randomize(joint_q={"arm": tl.Uniform(0, 1)}), r"`randomize` changes the scene after"),
     ],
 )

@@ -45,7 +45,10 @@ class Params:
     no effect. `Sim.inverse_dynamics` and the other functions of a state use the scene's values, not these. Reading
     takes a snapshot, so this client must be in control.
 
-    ``gravity`` (worlds, 3) [m/s²], ``body_mass_scale`` (worlds, bodies) [–], ``joint_armature`` [kg·m² or kg],
+    A write replaces the value of the model. Only ``body_mass_scale`` (worlds, bodies) [–] is a factor: of mass and
+    inertia of each link, 1 at the start.
+
+    ``gravity`` (worlds, 3) [m/s²], ``joint_armature`` [kg·m² or kg],
     ``joint_damping``, ``joint_target_kd`` [N·m·s/rad or N·s/m], ``joint_target_ke`` [N·m/rad or N/m],
     ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
     ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m]. ``body_mass`` (worlds, bodies) [kg] and

@@ -16,6 +16,27 @@ from tightloop.errors import TightloopError
 _WRITES, _WORLDS = 256, 16
 #: An inertia may be off from that of a body by this share, as rounding makes it [–].
 _SLACK = 1e-6
+#: Factors of the values of a model are within these, and a value this far outside of a range around 1 is none [–].
+_FACTORS, _BESIDE = (0.1, 10.0), 1.25
+#: Gravity beyond this is in other units, such as cm/s² [m/s²].
+_GRAVITY_MAX = 50.0
+#: Writes of a parameter that are compared with what was there.
+_COMPARED = 4
+#: Factors come in numbers, and most of them beside the values of the model.
+_DRAWS_MIN, _SHARE = 2, 0.5
+#: Parameters that a write replaces and that are other than 0 or 1 as a rule.
+_REPLACED = {
+    "actuator_bias",
+    "actuator_gain",
+    "body_inertia",
+    "body_mass",
+    "joint_armature",
+    "joint_damping",
+    "joint_effort_limit",
+    "joint_friction",
+    "joint_target_kd",
+    "joint_target_ke",
+}
 
 
 class ParamsAdvice:
@@ -29,6 +50,7 @@ class ParamsAdvice:
         self._info = info
         self._writes = 0
         self._told: set[str] = set()
+        self._compared: dict[str, int] = {}
         self._scene: dict[str, Any] | None = None
 
     def look(
@@ -57,6 +79,10 @@ class ParamsAdvice:
             "body_inertia": self._inertia,
             **({} if entries else {"shape_mu": self._friction}),
         }
+        for name in given.keys() & _REPLACED - self._told:
+            # reading what was there takes a snapshot
+            if self._compared.get(name, 0) < _COMPARED:
+                self._factors(name, given[name], mask, before)
         for name in given.keys() & looks.keys() - self._told:
             rows = np.flatnonzero(np.ones(len(given[name]), bool) if mask is None else mask)[:_WORLDS]
             problem = looks[name](given[name][rows], rows, before)
@@ -64,12 +90,51 @@ class ParamsAdvice:
                 self._told.add(name)
                 advice.warn_of_values(f"params.{name} {problem}")
 
+    def _factors(self, name: str, values: NDArray[Any], mask: NDArray[np.bool_] | None, before: Any) -> None:
+        """Look for factors around 1, which replace the values that they should scale."""
+        rows = np.flatnonzero(np.ones(len(values), bool) if mask is None else mask)[:_WORLDS]
+        given = values[rows]
+        # an assignment to some entries leaves the others
+        near = (given >= _FACTORS[0]) & (given <= _FACTORS[1])
+        if not near.any():
+            return
+        self._compared[name] = self._compared.get(name, 0) + 1
+        old = before(name)[rows]
+        changed = near & (given.astype(np.float32) != old.astype(np.float32)) & (old != 0.0)
+        if changed.sum() < _DRAWS_MIN or (changed != (given.astype(np.float32) != old.astype(np.float32))).any():
+            return
+        drawn, own = given[changed], old[changed]
+        low, high = drawn.min(), drawn.max()
+        beside = (own < low / _BESIDE) | (own > high * _BESIDE)
+        if not low < 1.0 < high or not beside.mean() > _SHARE:
+            return
+        self._told.add(name)
+        cure = (
+            "For factors, write body_mass_scale, which scales mass and inertia of a link together"
+            if name in ("body_mass", "body_inertia")
+            else f"For factors, multiply: factors * sim.params.{name}"
+        )
+        advice.warn_of_values(
+            f"params.{name} gets {low:.3g} to {high:.3g}, which look like factors, and a write replaces the value: "
+            f"{own.min():.3g} to {own.max():.3g} before. {cure}"
+        )
+
     def _gravity(self, values: NDArray[Any], rows: NDArray[Any], before: Any) -> str | None:
-        wrong = np.flatnonzero((values[:, 2] > 0.0) & (values[:, 2] != values[:, 0]))
-        if not len(wrong) or not self._has_loose():
+        if not self._has_moving():
             return None
-        x, y, z = (f"{value:g}" for value in values[wrong[0]])
-        return f"is ({x}, {y}, {z}) in world {rows[wrong[0]]}, which points up, and z is up: give (0, 0, -9.81)"
+        # the client tells of one number for all axes
+        different = values[:, 2] != values[:, 0]
+        x, y, z = values.T
+        problems = (
+            ((z > 0.0) & different, "points up, and z is up"),
+            ((z == 0.0) & ((x == 0.0) != (y == 0.0)), "acts along the ground, and z is up"),
+            ((np.abs(values) > _GRAVITY_MAX).any(axis=1) & different, "looks like another unit: it is in m/s²"),
+        )
+        for wrong, problem in problems:
+            if (found := np.flatnonzero(wrong)).size:
+                shown = ", ".join(f"{value:g}" for value in values[found[0]])
+                return f"is ({shown}) in world {rows[found[0]]}, which {problem}: give (0, 0, -9.81)"
+        return None
 
     def _effort(self, values: NDArray[Any], rows: NDArray[Any], before: Any) -> str | None:
         driven = np.flatnonzero(np.array(self._info.get("driven", ()), int) & 3)
@@ -150,9 +215,7 @@ class ParamsAdvice:
                 self._scene = {}
         return self._scene or {}
 
-    def _has_loose(self) -> bool:
-        """Return whether something floats above a ground."""
+    def _has_moving(self) -> bool:
+        """Return whether something may move that MuJoCo did not compile."""
         tables = self._tables()
-        floats = any(robot.get("floating") for robot in tables.get("robot", ()))
-        floats |= any(not body.get("fixed", False) for body in tables.get("body", ()))
-        return floats and any(shape["type"] in ("ground", "plane") for shape in tables.get("shape", ()))
+        return bool(tables.get("robot")) or any(not body.get("fixed", False) for body in tables.get("body", ()))

@@ -44,13 +44,18 @@ class SceneRandomization(SceneSensors):
     ) -> None:
         """Randomize start states and parameters of worlds, at launch and at each `Sim.reset`.
 
-        A draw of the state is an offset from the scene's start; a draw of a parameter replaces the scene's value.
-        `Sim.reset` says what a draw depends on.
+        A draw of the state is an offset from the scene's start. A draw of a parameter replaces the scene's value, and
+        is no factor of it. Only ``body_mass_scale`` is one: it multiplies mass and inertia of a link. `Sim.reset` says
+        what a draw depends on.
 
         >>> scene.randomize(
         ...     joint_q={"arm": tl.Uniform(-0.1, 0.1), "arm/fr3_joint4": tl.Normal(0.0, 0.02)},
         ...     body_q={"cube": {"x": tl.Uniform(-0.05, 0.05), "yaw": tl.Uniform(-3.14, 3.14)}},
-        ...     params={"shape_mu": {"cube/box": tl.Uniform(0.1, 1.0)}, "gravity": {"z": tl.Normal(-9.81, 0.1)}},
+        ...     params={
+        ...         "shape_mu": {"cube/box": tl.Uniform(0.1, 1.0)},
+        ...         "body_mass_scale": {"cube": tl.Uniform(0.8, 1.2)},  # factors; body_mass takes kilograms
+        ...         "gravity": {"z": tl.Normal(-9.81, 0.1)},
+        ...     },
         ... )
 
         Args:

@@ -6,7 +6,7 @@ use sim_model::{Description, Distribution, JointKind, Robot};
 use sim_physics::constants::params::Param;
 
 use super::some;
-use super::values::{has_loose, moving};
+use super::values::moving;
 
 /// Dofs of a free joint that turn it.
 const TURNS: std::ops::Range<usize> = 3..6;
@@ -18,7 +18,6 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
     // what MuJoCo compiled has its own conventions
     let robots = scene.robots.iter().filter(|robot| robot.mujoco.is_none());
     let mut all: Vec<String> = robots.filter_map(starts).collect();
-    all.extend(upwards(scene));
     all.extend(noise(scene));
     all.extend(masses(scene));
     all
@@ -50,18 +49,6 @@ fn starts(robot: &Robot) -> Option<String> {
             robot.name,
             some(&found)
         )
-    })
-}
-
-/// Draws of gravity that lift what floats off its ground.
-fn upwards(scene: &Description) -> Option<String> {
-    let drawn = scene.param_ranges.get(&Param::Gravity)?.get("z")?;
-    let least = match *drawn {
-        Distribution::Uniform { low, .. } => low,
-        Distribution::Normal { mean, .. } => mean,
-    };
-    (least > 0.0 && has_loose(scene)).then(|| {
-        format!("randomize: gravity of `z` is {least} or more, which points up, and z is up. Give -9.81, or draw around it.")
     })
 }
 

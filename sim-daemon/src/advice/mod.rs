@@ -1,8 +1,12 @@
 //! What is valid in a scene and most likely a mistake: told once, when a daemon starts, with the cure.
 
 mod draws;
+mod drives;
+mod factors;
 mod followers;
 mod friction;
+mod gravity;
+mod grounds;
 mod robots;
 mod start;
 mod values;
@@ -19,6 +23,9 @@ pub(crate) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
     let mut all = values::advice(scene);
     all.extend(robots::advice(scene));
     all.extend(followers::advice(scene));
+    all.extend(grounds::advice(scene));
+    all.extend(drives::unstable(scene, model));
+    all.extend(factors::advice(scene, model));
     all.extend(friction::advice(scene, model));
     all.extend(start::advice(scene, model));
     all

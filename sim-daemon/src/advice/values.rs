@@ -1,11 +1,10 @@
-//! Values with the wrong unit or order, and drives that cannot act.
+//! Values with the wrong unit or order.
 
 use std::f64::consts::TAU;
 
-use sim_model::{Description, Joint, JointDof, JointKind, Pose, Robot, Shape, TargetMode};
-use sim_physics::constants::params::Param;
+use sim_model::{Description, Joint, JointKind, Pose, Robot};
 
-use super::{draws, some};
+use super::{draws, drives, gravity, some};
 
 /// Physics steps longer than this are rare [s].
 const DT_USUAL: f64 = 0.05;
@@ -20,7 +19,8 @@ const W_FIRST: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
 
 /// Advice on numbers of the scene.
 pub(super) fn advice(scene: &Description) -> Vec<String> {
-    let mut all: Vec<String> = step(scene).into_iter().chain(upwards(scene)).collect();
+    let mut all: Vec<String> = step(scene).into_iter().collect();
+    all.extend(gravity::advice(scene));
     all.extend(empty(scene));
     all.extend(draws::advice(scene));
     let shapes = scene.shapes.iter();
@@ -44,8 +44,7 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
         all.extend(turned_shapes(robot));
         all.extend(degrees(robot, &name));
         all.extend(outside(robot, &name));
-        all.extend(powerless(scene, robot, &name));
-        all.extend(aimless(scene, robot, &name));
+        all.extend(drives::advice(scene, robot, &name));
     }
     all
 }
@@ -58,30 +57,12 @@ fn step(scene: &Description) -> Option<String> {
     })
 }
 
-/// Gravity that lifts what floats off its ground; an arm may well hang from a ceiling.
-fn upwards(scene: &Description) -> Option<String> {
-    let [x, y, z] = scene.gravity;
-    (z > 0.0 && has_loose(scene)).then(|| {
-        format!("gravity is ({x}, {y}, {z}), which points up, and z is up. Give (0, 0, -9.81).")
-    })
-}
-
 /// A scene in which nothing can move.
 fn empty(scene: &Description) -> Option<String> {
     scene.robots.is_empty().then(|| {
         "the scene has no robot and no body, so nothing happens in it. Add some with add_urdf, add_mujoco or add_body."
             .to_owned()
     })
-}
-
-/// Whether something floats above a ground, which gravity holds down.
-pub(super) fn has_loose(scene: &Description) -> bool {
-    let mut joints = scene.robots.iter().flat_map(|robot| &robot.joints);
-    let floats = joints.any(|joint| joint.kind == JointKind::Free && joint.parent.is_none());
-    let mut shapes = scene.shapes.iter();
-    let has_ground =
-        shapes.any(|shape| matches!(shape.shape, Shape::Plane | Shape::HeightField(_)));
-    floats && has_ground
 }
 
 /// A half turn about x that was most likely to be no turn.
@@ -159,58 +140,6 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
             some(&found)
         )
     })
-}
-
-/// Drives with gains that may not use any effort.
-fn powerless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
-    if varies(scene, Param::JointEffortLimit) {
-        return None;
-    }
-    let names: Vec<String> = moving(robot)
-        .filter(|joint| {
-            let is_powerless = |dof: &JointDof| {
-                dof.effort_limit == Some(0.0) && (dof.target_ke > 0.0 || dof.target_kd > 0.0)
-            };
-            joint.dofs.iter().any(is_powerless)
-        })
-        .map(|joint| format!("`{}`", joint.name))
-        .collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "{what}: the drives of {} have gains and an effort limit of 0, so they do nothing. Set joint_effort_limit; inf is no limit.",
-            some(&names)
-        )
-    })
-}
-
-/// Targets of drives without gains.
-fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
-    if varies(scene, Param::JointTargetKe) || varies(scene, Param::JointTargetKd) {
-        return None;
-    }
-    let names: Vec<String> = moving(robot)
-        .filter(|joint| matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic))
-        .filter(|joint| {
-            joint.dofs.iter().zip(&joint.q).any(|(dof, start)| {
-                let aims =
-                    dof.target_q.is_some_and(|target| target != *start) || dof.target_qd != 0.0;
-                let is_velocity = dof.target_mode == TargetMode::Velocity;
-                aims && dof.target_kd == 0.0 && (is_velocity || dof.target_ke == 0.0)
-            })
-        })
-        .map(|joint| format!("`{}`", joint.name))
-        .collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "{what}: {} have targets and no gains, so they ignore them. Set joint_target_ke and joint_target_kd.",
-            some(&names)
-        )
-    })
-}
-
-/// Whether worlds have values of their own.
-fn varies(scene: &Description, param: Param) -> bool {
-    scene.params.contains(&param) || scene.param_ranges.contains_key(&param)
 }
 
 pub(super) fn moving(robot: &Robot) -> impl Iterator<Item = &Joint> {
