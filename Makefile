@@ -22,7 +22,7 @@ export PYO3_BUILD_EXTENSION_MODULE := 1
 
 RUST_SOURCES   := $(shell find sim-core sim-daemon py-client/src py-client/Cargo.toml Cargo.toml rust-toolchain.toml \
   -name '*.rs' -o -name '*.toml')
-PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml \
+PYTHON_SOURCES := $(shell find py-client/python py-client/pyproject.toml examples \
   -name '*.py' -o -name '*.pyi' -o -name '*.toml' -o -name '*.npz' -o -name '*.urdf')
 PYTHON_FOLDERS := py-client/python py-client/tests tests examples benches docs
 RUFF           := $(VENV)/bin/ruff

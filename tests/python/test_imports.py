@@ -100,6 +100,8 @@ LAYERS = (
     ("tightloop.view",),
     ("tightloop.env",),
     ("tightloop.tasks", "tightloop.adapters"),
+    ("tightloop.examples",),
+    ("tightloop.train",),
     ("tightloop.scene_files",),
     ("tightloop.demo",),
     ("tightloop.__main__",),

@@ -45,7 +45,10 @@ def test_it_holds_what_the_package_holds(wheel):
         assert "tightloop=tightloop.__main__:main" in archive.read(entry).decode().replace(" ", "")
     sources = {f"tightloop/{path.relative_to(SOURCES)}" for path in SOURCES.rglob("*") if path.is_file()}
     sources = {name for name in sources if "__pycache__" not in name and not name.endswith(".so")}
-    assert inside == sources | {"tightloop/_core.abi3.so"}
+    # a link to the examples, of which the wheel has what programs need
+    examples = {name for name in inside if name.startswith("tightloop/examples/files/")}
+    assert {Path(name).suffix for name in examples} == {".py", ".onnx", ".csv", ".urdf", ".xml", ".safetensors"}
+    assert inside - examples == sources | {"tightloop/_core.abi3.so"}
     size = wheel.stat().st_size
     print(f"{wheel.name}: {size / 1e6:.1f} MB")
     # PyPI takes 100 MB; debug information left in would be ten times of what it is
