@@ -83,6 +83,7 @@ mod core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        sim_daemon::keep_meshes();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -44,9 +44,15 @@ pub use error::DaemonError;
 ///
 /// If a driver thread is still compiling then, it ends the process with that code itself.
 pub fn serve(args: impl IntoIterator<Item = OsString>) -> i32 {
+    keep_meshes();
     let code = commands::run(args);
     sim_engine::options::leave(code);
     code
+}
+
+/// Keeps compiled meshes in the user's cache folder from now on; a process needs it once.
+pub fn keep_meshes() {
+    sim_model::geometry::keep_meshes(sim_engine::options::cache_folder);
 }
 
 /// Names of all fields that frames may carry.

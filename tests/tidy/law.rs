@@ -91,6 +91,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "joint_kind",
             "error",
             "files",
+            "cache_files",
             "pose",
             "value_checks",
             "inertia",
@@ -326,7 +327,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
 ];
 
 /// The only door of each heavy package.
-pub const DOORS: [(&str, &str); 21] = [
+pub const DOORS: [(&str, &str); 23] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/module.rs"),
     ("wgpu", "sim-core/device/src"),
@@ -335,6 +336,8 @@ pub const DOORS: [(&str, &str); 21] = [
     ("parry3d_f64", "sim-core/model/src/geometry"),
     ("gltf", "sim-core/model/src/geometry/load"),
     ("base64", "sim-core/model/src/geometry/load"),
+    ("blake3", "sim-core/model/src/cache_files.rs"),
+    ("postcard", "sim-core/model/src/geometry/cache.rs"),
     ("rayon", "sim-core/engine/src/backend/cpu"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),

@@ -103,7 +103,7 @@ impl Default for Options {
     }
 }
 
-/// Folder that keeps GPU programs from run to run, if this user has a cache folder.
+/// Folder that keeps GPU programs and compiled meshes from run to run, if this user has a cache folder.
 pub fn cache_folder() -> Option<PathBuf> {
     let absolute = |name: &str| {
         let path = PathBuf::from(std::env::var_os(name)?);

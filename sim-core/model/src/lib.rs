@@ -7,6 +7,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `joint_kind`, `error`, `pose` | motions of joints, what can be wrong, frames |
+//! | `files`, `cache_files` | files to read; files of a cache |
 //! | `value_checks` | checks of one name or one value |
 //! | `inertia`, `geometry` | mass properties; shapes, meshes, convex hulls |
 //! | `distribution`, `surface`, `softness`, `geom_contact` | what values are drawn from; how shapes touch, and MuJoCo's geoms |
@@ -18,6 +19,7 @@
 //! | `hull_tables`, `model` | the kernel source's tables of hulls; the result |
 //! | `compile` | from a description to a model |
 
+pub mod cache_files;
 mod compile;
 mod description;
 mod distribution;

@@ -1,5 +1,7 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
+use serde::{Deserialize, Serialize};
+
 use super::polytope::triangles_around_stretched;
 use super::stretch::{NoHull, stretched};
 use super::vector::{
@@ -15,7 +17,7 @@ const COORDINATE_MAX: f64 = 1e100;
 const PLATE: f64 = 1e-3;
 
 /// A convex polyhedron.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hull {
     /// Corners, each one of the points it was made of. `(vertices, 3)` [m]
     pub vertices: Vec<[f64; 3]>,
@@ -30,7 +32,7 @@ pub struct Hull {
 }
 
 /// A side of a hull.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Face {
     /// Indices of its corners, counter-clockwise from outside.
     pub corners: Vec<u32>,
@@ -41,7 +43,7 @@ pub struct Face {
 }
 
 /// Where two faces of a hull meet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Edge {
     /// Indices of its ends; the first face runs from the first to the second, the second face back.
     pub ends: [u32; 2],

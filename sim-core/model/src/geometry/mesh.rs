@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+use super::cache::Recipe;
 use super::hull::Hull;
-use super::load::{Loaded, load};
+use super::load::{Beside, Loaded, Source};
 use super::parry::convex_parts;
 use super::polytope::triangles_around;
 use super::stretch::stretched;
@@ -93,11 +94,29 @@ impl Mesh {
     /// Why the file cannot be used, by its path, with the cure.
     pub fn load(path: &Path, scale: [f64; 3], options: &MeshOptions) -> Result<Mesh, ModelError> {
         options.validate()?;
+        let source = Source::read(path).map_err(|reason| fault(path, reason))?;
+        let mut recipe = Recipe::new(scale, options);
+        recipe.add(&source.kind());
+        recipe.add(&source.bytes);
+        recipe.mesh(path, scale, || {
+            let loaded = source.load(options.collada_up_axis);
+            let loaded = loaded.map_err(|reason| fault(path, reason))?;
+            Mesh::of_loaded(path, scale, loaded, options)
+        })
+    }
+
+    fn of_loaded(
+        path: &Path,
+        scale: [f64; 3],
+        loaded: Loaded,
+        options: &MeshOptions,
+    ) -> Result<(Mesh, Vec<Beside>), ModelError> {
         let Loaded {
             mut triangles,
             notes,
             ignored_up_axis,
-        } = load(path, options.collada_up_axis).map_err(|reason| fault(path, reason))?;
+            beside,
+        } = loaded;
         for vertex in &mut triangles.vertices {
             for axis in 0..3 {
                 vertex[axis] *= scale[axis];
@@ -108,10 +127,11 @@ impl Mesh {
             triangles.turn_over();
         }
         let mesh = Mesh::made(path, scale, triangles, None, notes, options)?;
-        Ok(Mesh {
+        let mesh = Mesh {
             ignored_up_axis,
             ..mesh
-        })
+        };
+        Ok((mesh, beside))
     }
 
     /// A mesh by its name, of these triangles; its hull is that of some of its vertices, or of all.
@@ -125,8 +145,15 @@ impl Mesh {
         options: &MeshOptions,
     ) -> Result<Mesh, ModelError> {
         options.validate()?;
-        let path = Path::new(name);
-        Mesh::made(path, [1.0; 3], triangles, hull, Vec::new(), options)
+        let (path, scale) = (Path::new(name), [1.0; 3]);
+        let mut recipe = Recipe::new(scale, options);
+        recipe.add_rows(&triangles.vertices);
+        recipe.add_corners(&triangles.triangles);
+        recipe.add_rows(hull.unwrap_or_default());
+        recipe.mesh(path, scale, || {
+            let mesh = Mesh::made(path, scale, triangles, hull, Vec::new(), options)?;
+            Ok((mesh, Vec::new()))
+        })
     }
 
     fn made(

@@ -2,6 +2,7 @@
 //!
 //! Everything is f64 and happens when a description is made, never in a step.
 
+mod cache;
 mod cluster;
 mod height_field;
 mod hull;
@@ -20,6 +21,7 @@ mod trimesh;
 mod vector;
 mod visual;
 
+pub use cache::keep_meshes;
 pub use height_field::{HeightField, SAMPLES_MAX};
 pub use hull::{Edge, Face, Hull};
 pub use load::{FILE_MAX, TRIANGLES_MAX};

@@ -2,13 +2,15 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::vector::{Vector, area_vector, cross, dot, norm, six_volumes, sub};
 
 /// Most work on finding which shells are cavities [triangles visited]: a second or two.
 const CAVITY_WORK_MAX: usize = 1 << 27;
 
 /// Triangles with shared vertices, counter-clockwise from outside where they have one.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TriMesh {
     /// Positions. `(vertices, 3)` [m]
     pub vertices: Vec<[f64; 3]>,

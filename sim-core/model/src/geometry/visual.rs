@@ -76,6 +76,7 @@ impl VisualMesh {
             runs,
             notes,
             ignored_up_axis,
+            beside: _,
         } = read(path, true, collada_up_axis).map_err(fault)?;
         let (vertices, triangles, mut origins) = joined(&vertices, &triangles);
         if triangles.is_empty() {

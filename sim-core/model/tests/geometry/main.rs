@@ -3,6 +3,7 @@
 mod files;
 mod formats;
 mod hulls;
+mod kept;
 mod looks;
 mod mass;
 mod refused;

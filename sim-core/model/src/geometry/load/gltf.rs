@@ -39,6 +39,7 @@ pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMes
         visits: 0,
     };
     scene.whole(&document)?;
+    scene.mesh.beside = scene.buffers.beside;
     Ok(scene.mesh)
 }
 

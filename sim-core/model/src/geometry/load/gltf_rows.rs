@@ -6,10 +6,15 @@ use base64::Engine as _;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::{Accessor, Document, buffer};
 
-use super::{FILE_MAX, bytes_of};
+use super::{Beside, FILE_MAX, bytes_of};
+use crate::cache_files::digest;
 
 /// The bytes of a file's buffers.
-pub(super) struct Buffers(Vec<Vec<u8>>);
+pub(super) struct Buffers {
+    bytes: Vec<Vec<u8>>,
+    /// Those of them that are files.
+    pub beside: Vec<Beside>,
+}
 
 impl Buffers {
     /// Reads all buffers; `blob` is the binary part of the file itself.
@@ -18,14 +23,14 @@ impl Buffers {
         mut blob: Option<Vec<u8>>,
         folder: &Path,
     ) -> Result<Buffers, String> {
-        let mut buffers = Vec::new();
+        let (mut buffers, mut beside) = (Vec::new(), Vec::new());
         let mut total = 0;
         for buffer in document.buffers() {
             let data = match buffer.source() {
                 buffer::Source::Bin => blob
                     .take()
                     .ok_or("its binary part is missing; export it again")?,
-                buffer::Source::Uri(uri) => external(uri, folder)?,
+                buffer::Source::Uri(uri) => external(uri, folder, &mut beside)?,
             };
             if data.len() < buffer.length() {
                 let (told, found) = (buffer.length(), data.len());
@@ -42,7 +47,10 @@ impl Buffers {
             }
             buffers.push(data);
         }
-        Ok(Buffers(buffers))
+        Ok(Buffers {
+            bytes: buffers,
+            beside,
+        })
     }
 
     /// Positions.
@@ -95,7 +103,7 @@ impl Buffers {
 
     /// A part of the buffers.
     pub fn view(&self, view: &buffer::View) -> Option<&[u8]> {
-        let data = self.0.get(view.buffer().index())?;
+        let data = self.bytes.get(view.buffer().index())?;
         data.get(view.offset()..)?.get(..view.length())
     }
 
@@ -138,7 +146,7 @@ fn f32_at(bytes: &[u8], at: usize) -> f32 {
 }
 
 /// The bytes of a buffer that is not in the file itself.
-fn external(uri: &str, folder: &Path) -> Result<Vec<u8>, String> {
+fn external(uri: &str, folder: &Path, beside: &mut Vec<Beside>) -> Result<Vec<u8>, String> {
     if let Some(data) = uri.strip_prefix("data:") {
         return base64_of(data).map_err(|reason| format!("a buffer's {reason}; export it again"));
     }
@@ -151,7 +159,13 @@ fn external(uri: &str, folder: &Path) -> Result<Vec<u8>, String> {
             "its buffer `{uri}` is not a file beside it; export it as .glb"
         ));
     }
-    bytes_of(&folder.join(path), FILE_MAX).map_err(|reason| format!("its buffer `{uri}`: {reason}"))
+    let bytes = bytes_of(&folder.join(path), FILE_MAX)
+        .map_err(|reason| format!("its buffer `{uri}`: {reason}"))?;
+    beside.push(Beside {
+        path: uri.to_owned(),
+        digest: digest(&bytes),
+    });
+    Ok(bytes)
 }
 
 /// The bytes of a `data:` URI, what follows the colon.

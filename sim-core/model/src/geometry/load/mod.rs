@@ -1,6 +1,6 @@
 //! Mesh files to triangles and their looks, in the file's own frame and units turned to metres and z up.
 //!
-//! One reader per format serves both: collisions take the triangles ([`load`]), visuals the materials, too
+//! One reader per format serves both: collisions take the triangles ([`Source::load`]), visuals the materials, too
 //! ([`super::visual`]).
 //!
 //! What comes from outside is checked: sizes before memory is taken, indices before they are followed, numbers for being
@@ -25,8 +25,9 @@ mod text;
 use std::path::Path;
 
 use super::trimesh::TriMesh;
+use crate::cache_files::digest;
 use crate::files::{self, FileError};
-pub(super) use raw::{Material, RawMesh, Run, Uv};
+pub(super) use raw::{Beside, Material, RawMesh, Run, Uv};
 
 /// Largest file [bytes].
 pub const FILE_MAX: u64 = 256 << 20;
@@ -88,27 +89,96 @@ pub(super) struct Loaded {
     pub notes: Vec<String>,
     /// The axis that its file says is up, where that is not z and was not applied.
     pub ignored_up_axis: Option<&'static str>,
+    /// Other files whose bytes are in the triangles.
+    pub beside: Vec<Beside>,
 }
 
-/// Reads the triangles of a file.
-///
-/// # Errors
-/// Why the file cannot be used, and the cure.
-pub(super) fn load(path: &Path, collada_up_axis: bool) -> Result<Loaded, String> {
-    let raw = read(path, false, collada_up_axis)?;
-    let triangles = TriMesh {
-        vertices: raw.vertices,
-        triangles: raw.triangles,
+/// A mesh file that was read and not yet understood.
+pub(super) struct Source<'a> {
+    path: &'a Path,
+    format: Format,
+    pub bytes: Vec<u8>,
+}
+
+impl<'a> Source<'a> {
+    /// Reads the bytes of a mesh file.
+    ///
+    /// # Errors
+    /// Why the file cannot be used, and the cure.
+    pub fn read(path: &'a Path) -> Result<Source<'a>, String> {
+        let format = format_of(path)?;
+        let bytes = bytes_of(path, FILE_MAX)?;
+        if bytes.is_empty() {
+            return Err("it is empty; export it again".to_owned());
+        }
+        Ok(Source {
+            path,
+            format,
+            bytes,
+        })
     }
-    .joined();
-    if triangles.triangles.is_empty() {
-        return Err(NO_AREA.to_owned());
+
+    /// What the bytes mean, beside themselves.
+    pub fn kind(&self) -> [u8; 1] {
+        [self.format as u8]
     }
-    Ok(Loaded {
-        triangles,
-        notes: raw.notes,
-        ignored_up_axis: raw.ignored_up_axis,
-    })
+
+    /// The triangles of the file.
+    ///
+    /// # Errors
+    /// Why the file cannot be used, and the cure.
+    pub fn load(&self, collada_up_axis: bool) -> Result<Loaded, String> {
+        let raw = self.raw(false, collada_up_axis)?;
+        let triangles = TriMesh {
+            vertices: raw.vertices,
+            triangles: raw.triangles,
+        }
+        .joined();
+        if triangles.triangles.is_empty() {
+            return Err(NO_AREA.to_owned());
+        }
+        Ok(Loaded {
+            triangles,
+            notes: raw.notes,
+            ignored_up_axis: raw.ignored_up_axis,
+            beside: raw.beside,
+        })
+    }
+
+    /// The file as it is, with its materials if looks are wanted; coordinates are finite and indices in range.
+    fn raw(&self, looks: bool, collada_up_axis: bool) -> Result<RawMesh, String> {
+        let limits = Limits {
+            triangles: TRIANGLES_MAX,
+            looks,
+            collada_up_axis,
+        };
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let raw = match self.format {
+            Format::Stl => stl::read(&self.bytes, limits),
+            Format::Obj => obj::read(&self.bytes, folder, limits),
+            Format::Dae => dae::read(&self.bytes, folder, limits),
+            Format::Gltf => gltf::read(&self.bytes, folder, limits),
+        }?;
+        if raw.triangles.is_empty() {
+            return Err("it holds no triangles; export a surface".to_owned());
+        }
+        if let Some(far) = raw
+            .vertices
+            .iter()
+            .flatten()
+            .find(|x| x.is_nan() || x.abs() > COORDINATE_MAX)
+        {
+            return Err(format!(
+                "a vertex has the coordinate {far}; give finite numbers of at most {COORDINATE_MAX:e}"
+            ));
+        }
+        Ok(raw)
+    }
+}
+
+/// Whether a file is still beside a mesh file in this folder.
+pub(super) fn is_beside(file: &Beside, folder: &Path) -> bool {
+    bytes_of(&folder.join(&file.path), FILE_MAX).is_ok_and(|bytes| digest(&bytes) == file.digest)
 }
 
 /// Reads a file as it is, with its materials if looks are wanted; coordinates are finite and indices in range.
@@ -116,37 +186,7 @@ pub(super) fn load(path: &Path, collada_up_axis: bool) -> Result<Loaded, String>
 /// # Errors
 /// Why the file cannot be used, and the cure.
 pub(super) fn read(path: &Path, looks: bool, collada_up_axis: bool) -> Result<RawMesh, String> {
-    let format = format_of(path)?;
-    let bytes = bytes_of(path, FILE_MAX)?;
-    if bytes.is_empty() {
-        return Err("it is empty; export it again".to_owned());
-    }
-    let limits = Limits {
-        triangles: TRIANGLES_MAX,
-        looks,
-        collada_up_axis,
-    };
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let raw = match format {
-        Format::Stl => stl::read(&bytes, limits),
-        Format::Obj => obj::read(&bytes, folder, limits),
-        Format::Dae => dae::read(&bytes, folder, limits),
-        Format::Gltf => gltf::read(&bytes, folder, limits),
-    }?;
-    if raw.triangles.is_empty() {
-        return Err("it holds no triangles; export a surface".to_owned());
-    }
-    if let Some(far) = raw
-        .vertices
-        .iter()
-        .flatten()
-        .find(|x| x.is_nan() || x.abs() > COORDINATE_MAX)
-    {
-        return Err(format!(
-            "a vertex has the coordinate {far}; give finite numbers of at most {COORDINATE_MAX:e}"
-        ));
-    }
-    Ok(raw)
+    Source::read(path)?.raw(looks, collada_up_axis)
 }
 
 fn format_of(path: &Path) -> Result<Format, String> {

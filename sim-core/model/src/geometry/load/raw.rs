@@ -2,10 +2,13 @@
 
 use std::rc::Rc;
 
+use serde::{Deserialize, Serialize};
+
 use super::super::vector::Vector;
 use super::super::visual::{Color, Image};
 use super::Limits;
 use super::scene::Affine;
+use crate::cache_files::DIGEST;
 
 /// Triangles of a file, with what is known of their looks.
 #[derive(Default)]
@@ -18,6 +21,16 @@ pub(in super::super) struct RawMesh {
     pub notes: Vec<String>,
     /// The axis that the file says is up, where that is not z and was not applied.
     pub ignored_up_axis: Option<&'static str>,
+    /// Other files whose bytes are in the triangles.
+    pub beside: Vec<Beside>,
+}
+
+/// A file beside a mesh file, whose bytes are part of the mesh.
+#[derive(Clone, Serialize, Deserialize)]
+pub(in super::super) struct Beside {
+    /// Its path from the folder of the mesh file.
+    pub path: String,
+    pub digest: [u8; DIGEST],
 }
 
 /// Colour and image of a material.
