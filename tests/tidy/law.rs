@@ -104,6 +104,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "ray_scene",
             "urdf",
             "rigid_body",
+            "hull_fans",
             "hull_tables",
             "model",
             "compile",

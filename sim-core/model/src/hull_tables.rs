@@ -1,6 +1,7 @@
 //! Convex hulls as the narrow phase reads them: rows of the model's tables.
 
 use crate::geometry::{Face, Hull};
+use crate::hull_fans::Fans;
 use sim_physics::constants::hull::{CLUSTER, CORNERS_MAX, HullTables};
 use sim_physics::lane::{Fixed, Tables};
 
@@ -18,13 +19,22 @@ pub struct HullFrame {
     pub radius: f64,
 }
 
-/// Appends hulls to the tables of a model; hull `i` is row `i` of `spans` and `sizes`.
-pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<HullFrame>) {
+/// Appends hulls to the tables of a model; hull `i` is row `i` of `spans` and `sizes`. Where `with_fans` a plane touches them as in
+/// MuJoCo.
+pub fn append(
+    hulls: &[Hull],
+    with_fans: bool,
+    tables: &mut Tables<f64>,
+) -> (HullTables, Vec<HullFrame>) {
     let frames: Vec<HullFrame> = hulls.iter().map(HullFrame::of).collect();
     let mut rows = Rows::default();
     let clustered = hulls.iter().any(|hull| hull.vertices.len() > CLUSTER);
+    let mut fans = Fans::default();
     for (hull, frame) in hulls.iter().zip(&frames) {
-        rows.push(hull, frame, clustered);
+        let order = rows.push(hull, frame, clustered);
+        if with_fans {
+            fans.push(hull, frame.center, &order);
+        }
     }
     let spans = Fixed {
         base: tables.indices.len(),
@@ -54,7 +64,7 @@ pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<Hull
         tables.numbers.extend(new);
         Fixed { base, stride, rows }
     };
-    let placed = HullTables {
+    let mut placed = HullTables {
         spans,
         sizes: numbers(4, rows.sizes),
         vertices: numbers(12, rows.vertices),
@@ -67,7 +77,11 @@ pub fn append(hulls: &[Hull], tables: &mut Tables<f64>) -> (HullTables, Vec<Hull
             true => numbers(4, rows.clusters),
             false => Fixed::default(),
         },
+        ..HullTables::default()
     };
+    if with_fans {
+        fans.append(&mut placed, tables);
+    }
     (placed, frames)
 }
 
@@ -98,7 +112,8 @@ struct Rows {
 }
 
 impl Rows {
-    fn push(&mut self, hull: &Hull, frame: &HullFrame, clustered: bool) {
+    /// Adds a hull. Returns its vertices in the order of `vertices`.
+    fn push(&mut self, hull: &Hull, frame: &HullFrame, clustered: bool) -> Vec<u32> {
         let centred = |vertex: u32| -> [f64; 3] {
             let place = hull.vertices[vertex as usize];
             std::array::from_fn(|i| place[i] - frame.center[i])
@@ -115,7 +130,7 @@ impl Rows {
             let end = self.clusters.len() / 4;
             self.cluster_spans.extend([first as u32, end as u32]);
         } else {
-            self.push_vertices(order.into_iter().map(centred).collect());
+            self.push_vertices(order.iter().map(|&vertex| centred(vertex)).collect());
         }
         for face in &hull.faces {
             let offset = face.offset - dot(face.normal, frame.center);
@@ -142,6 +157,7 @@ impl Rows {
             .extend((0..3).flat_map(|table| [first[table], end[table]]));
         self.sizes.extend(frame.half_extents);
         self.sizes.push(frame.radius);
+        order
     }
 
     /// Four vertices a row; the last row repeats the last vertex.
@@ -237,7 +253,7 @@ mod tests {
     fn every_vertex_is_in_the_ball_of_its_cluster_and_in_no_other() {
         let (large, small) = (ball(500), ball(10));
         let mut tables = Tables::default();
-        let (placed, frames) = append(&[large.clone(), small], &mut tables);
+        let (placed, frames) = append(&[large.clone(), small], false, &mut tables);
         let index =
             |t: Fixed, row: usize, k: usize| tables.indices[t.base + row * t.stride + k] as usize;
         let number = |t: Fixed, k: usize| tables.numbers[t.base + k];
@@ -277,7 +293,7 @@ mod tests {
 
     #[test]
     fn small_hulls_have_no_clusters() {
-        let (placed, _) = append(&[ball(CLUSTER)], &mut Tables::default());
+        let (placed, _) = append(&[ball(CLUSTER)], false, &mut Tables::default());
         assert_eq!(placed.clusters, Fixed::default());
     }
 }

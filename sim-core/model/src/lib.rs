@@ -16,7 +16,7 @@
 //! | `validate` | checks of a description |
 //! | `ray_scene` | what rays meet in many worlds |
 //! | `urdf`, `mujoco`, `rigid_body` | robots from files; bodies of one link |
-//! | `hull_tables`, `model` | the kernel source's tables of hulls; the result |
+//! | `hull_fans`, `hull_tables`, `model` | the kernel source's tables of hulls; the result |
 //! | `compile` | from a description to a model |
 
 pub mod cache_files;
@@ -27,6 +27,7 @@ mod error;
 pub mod files;
 mod geom_contact;
 pub mod geometry;
+mod hull_fans;
 pub mod hull_tables;
 mod inertia;
 mod joint_kind;

@@ -277,6 +277,7 @@ impl Model {
             .replace(", mujoco_capsule_boxes: false", "")
             .replace(", link_axes: None", "")
             .replace(&format!(", turning: {:?}", Fixed::default()), "")
+            .replace(&no_fans(), "")
             .replace(&no_clusters(), "")
             .replace(&no_fields()[0], "")
             .replace(&no_fields()[1], "")
@@ -309,6 +310,14 @@ fn no_fields() -> [String; 2] {
             ", field_candidates: {candidates:?}, field_cells: {candidates:?}, field_prisms: {candidates:?}"
         ),
     ]
+}
+
+/// What the `Debug` text of a model says where no plane touches hulls as in MuJoCo.
+fn no_fans() -> String {
+    let none = Fixed::default();
+    format!(
+        ", ranks: {none:?}, fan_spans: {none:?}, fan_sizes: {none:?}, fans: {none:?}, origins: {none:?}"
+    )
 }
 
 /// What the `Debug` text of a model says where no hull has clusters of vertices.

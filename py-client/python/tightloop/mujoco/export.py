@@ -43,6 +43,7 @@ _ARRAYS = """
     geom_solref geom_solimp geom_friction geom_margin geom_gap geom_fluid
     hfield_nrow hfield_ncol hfield_adr hfield_size hfield_data
     mesh_vertadr mesh_vertnum mesh_vert mesh_faceadr mesh_facenum mesh_face exclude_signature
+    mesh_polyadr mesh_polynum mesh_polynormal mesh_polyvertadr mesh_polyvertnum mesh_polyvert
     eq_obj1id eq_obj2id eq_active0 eq_data eq_solref eq_solimp site_bodyid site_pos site_quat
     tendon_adr tendon_num tendon_damping tendon_stiffness tendon_lengthspring tendon_frictionloss tendon_limited
     tendon_range tendon_margin tendon_length0 tendon_invweight0 tendon_solref_lim tendon_solimp_lim

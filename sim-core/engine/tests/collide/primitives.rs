@@ -277,7 +277,7 @@ fn shapes_at_rest_have_the_points_that_hold_them() {
         (Shape::Plane, capsule, lying, 0.02, 2),
         (Shape::Plane, capsule, UPRIGHT, 0.12, 1),
         (Shape::Plane, cylinder, lying, 0.03, 2),
-        (Shape::Plane, cylinder, UPRIGHT, 0.1, 4),
+        (Shape::Plane, cylinder, UPRIGHT, 0.1, 3),
         (Shape::Plane, brick, UPRIGHT, 0.04, 4),
         (slab, brick, UPRIGHT, 0.09, 4),
     ] {

@@ -84,7 +84,6 @@ pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
         (Kind::Plane, Kind::Capsule) => 2,
         (Kind::Capsule, Kind::Capsule) => 2,
         (Kind::Capsule, _) => 3,
-        (Kind::Plane, Kind::Cylinder) => 5,
         (Kind::Box, Kind::Box) => 8,
         _ => 4,
     }
@@ -241,7 +240,14 @@ pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -
         };
         pieces.push(piece(index, b, kind, b.pose, size, radius, 0));
     }
-    let (tables, frames) = hull_tables::append(&hulls, &mut contacts.tables);
+    let touches = |kind: Kind, of_mujoco: bool| {
+        let mut of = pieces.iter().filter(|piece| piece.solid.kind == kind);
+        of.any(|piece| !of_mujoco || shapes[piece.shape].geom.is_some())
+    };
+    // one rule for all pairs of planes and hulls
+    let is_mujocos = touches(Kind::Plane, true) || touches(Kind::Hull, true);
+    let with_fans = is_mujocos && touches(Kind::Plane, false);
+    let (tables, frames) = hull_tables::append(&hulls, with_fans, &mut contacts.tables);
     contacts.hulls = tables;
     for piece in pieces
         .iter_mut()

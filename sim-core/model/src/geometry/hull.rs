@@ -25,6 +25,8 @@ pub struct Hull {
     pub faces: Vec<Face>,
     /// Where two faces meet.
     pub edges: Vec<Edge>,
+    /// Polygons around it as MuJoCo made them, which rest on planes; `faces` do where there are none.
+    pub polygons: Vec<Polygon>,
     /// Largest height above the faces of a point that was left out [m].
     pub error: f64,
     /// Whether it is a plate that stands for points in a plane.
@@ -40,6 +42,15 @@ pub struct Face {
     pub normal: [f64; 3],
     /// Its plane is where normal · x is this [m].
     pub offset: f64,
+}
+
+/// A side of a hull without its place: MuJoCo's joins neighbours that differ more than those of a [`Face`], or less.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Polygon {
+    /// Indices of its corners, counter-clockwise from outside.
+    pub corners: Vec<u32>,
+    /// Unit normal, outward [–].
+    pub normal: [f64; 3],
 }
 
 /// Where two faces of a hull meet.
@@ -134,6 +145,33 @@ impl Hull {
             }
         }
         volume
+    }
+
+    /// The same hull with these vertices, in their order, and these polygons to rest on.
+    ///
+    /// All of its own vertices are among them; the others lie on it or inside, up to a rounding. A plate that stands for points
+    /// in a plane has vertices of its own, and stays as it is.
+    pub fn with_polygons(mut self, vertices: Vec<[f64; 3]>, polygons: Vec<Polygon>) -> Hull {
+        let place = |vertex: [f64; 3]| vertices.iter().position(|&other| other == vertex);
+        let places: Option<Vec<usize>> =
+            self.vertices.iter().map(|&vertex| place(vertex)).collect();
+        let Some(places) = places else {
+            return self;
+        };
+        let renamed = |corner: u32| places[corner as usize] as u32;
+        for face in &mut self.faces {
+            face.corners
+                .iter_mut()
+                .for_each(|corner| *corner = renamed(*corner));
+        }
+        for edge in &mut self.edges {
+            edge.ends = edge.ends.map(renamed);
+        }
+        Hull {
+            vertices,
+            polygons,
+            ..self
+        }
     }
 
     /// The hull whose faces have these outlines.

@@ -18,12 +18,12 @@ mod stretch;
 mod tessellate;
 mod triangle_tree;
 mod trimesh;
-mod vector;
+pub(crate) mod vector;
 mod visual;
 
 pub use cache::keep_meshes;
 pub use height_field::{HeightField, SAMPLES_MAX};
-pub use hull::{Edge, Face, Hull};
+pub use hull::{Edge, Face, Hull, Polygon};
 pub use load::{FILE_MAX, TRIANGLES_MAX};
 pub use mass::{DENSITY, mass_properties};
 pub use mesh::{HULL_NOTE, Mesh, MeshOptions};

@@ -8,7 +8,10 @@ use super::names::names;
 use super::options::MujocoOptions;
 use crate::description::Shape;
 use crate::error::ModelError;
-use crate::geometry::{Mesh, MeshOptions, TriMesh};
+use crate::geometry::{Hull, Mesh, MeshOptions, Polygon, TriMesh};
+
+/// Of a mesh with fewer vertices MuJoCo looks at all of them, of others at those of its hull.
+const HULL_VERTICES_MIN: usize = 10;
 
 /// All meshes of a model.
 pub(super) struct Meshes<'a> {
@@ -22,6 +25,75 @@ pub(super) struct Meshes<'a> {
     corners: Vec<i64>,
     /// Of each mesh, its part of the vertices, faces and corners.
     parts: Vec<[Range<usize>; 3]>,
+    /// Polygons around each mesh's hull, with corners counted likewise; none where a file of an older version lacks them.
+    polygons: Vec<Vec<Polygon>>,
+}
+
+/// Reads the polygons around the hull of each mesh.
+fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelError> {
+    let beyond = || file.fault("has polygons that are not there".to_owned());
+    let parts = |first: i64, count: i64| {
+        let first = usize::try_from(first).ok()?;
+        Some(first..first.checked_add(usize::try_from(count).ok()?)?)
+    };
+    let corners = file.integers_or("mesh_polyvert", file.rows("mesh_polyvert"), 0)?;
+    let rows = file.rows("mesh_polynormal");
+    let normals: Vec<[f64; 3]> = match rows {
+        0 => Vec::new(),
+        _ => file.vectors("mesh_polynormal", rows)?,
+    };
+    if normals.as_flattened().iter().any(|x| !x.is_finite()) {
+        return Err(file.fault("has a polygon with an infinite normal".to_owned()));
+    }
+    let firsts = file.integers_or("mesh_polyvertadr", rows, 0)?;
+    let counts = file.integers_or("mesh_polyvertnum", rows, 0)?;
+    let mut all = Vec::with_capacity(rows);
+    for (polygon, (&first, &count)) in firsts.iter().zip(&counts).enumerate() {
+        let own = parts(first, count).and_then(|part| corners.get(part));
+        let own = own.and_then(|own| {
+            own.iter()
+                .map(|&corner| u32::try_from(corner).ok())
+                .collect()
+        });
+        all.push(Polygon {
+            corners: own.ok_or_else(beyond)?,
+            normal: normals[polygon],
+        });
+    }
+    let firsts = file.integers_or("mesh_polyadr", count, 0)?;
+    let counts = file.integers_or("mesh_polynum", count, 0)?;
+    let of_meshes = firsts.into_iter().zip(counts);
+    let of_meshes = of_meshes.map(|(first, count)| Some(all.get(parts(first, count)?)?.to_vec()));
+    of_meshes.collect::<Option<_>>().ok_or_else(beyond)
+}
+
+/// The hull as MuJoCo has it: its vertices in the order in which equally deep ones count, and its polygons.
+///
+/// `corners` are the vertices of the mesh that MuJoCo's hull has. A hull with fewer vertices keeps its own faces.
+fn as_mujoco(hull: Hull, vertices: &[[f64; 3]], corners: &[usize], polygons: &[Polygon]) -> Hull {
+    let order: Vec<usize> = match vertices.len() < HULL_VERTICES_MIN {
+        true => (0..vertices.len()).collect(),
+        false => corners.to_vec(),
+    };
+    let mut places = vec![None; vertices.len()];
+    for (place, &vertex) in order.iter().enumerate() {
+        places[vertex] = Some(place as u32);
+    }
+    let renamed = polygons.iter().map(|polygon| {
+        let corners = polygon.corners.iter();
+        let corners = corners.map(|&corner| places.get(corner as usize).copied()?);
+        Some(Polygon {
+            corners: corners.collect::<Option<_>>()?,
+            normal: polygon.normal,
+        })
+    });
+    match renamed.collect() {
+        Some(polygons) => {
+            let vertices = order.into_iter().map(|vertex| vertices[vertex]).collect();
+            hull.with_polygons(vertices, polygons)
+        }
+        None => hull,
+    }
 }
 
 impl<'a> Meshes<'a> {
@@ -52,6 +124,7 @@ impl<'a> Meshes<'a> {
             faces: file.vectors_of_integers("mesh_face", ends[1])?,
             corners: file.integers("mesh_hullvert", ends[2])?,
             parts: parts.map(|((v, f), c)| [v, f, c]).collect(),
+            polygons: polygons(file, count)?,
         })
     }
 
@@ -90,26 +163,34 @@ impl<'a> Meshes<'a> {
     pub fn shape(&self, mesh: i64, options: &MujocoOptions) -> Result<Shape, ModelError> {
         let triangles = self.triangles(mesh)?;
         let place = self.place(mesh)?;
-        let hull = self.corners[self.parts[place][2].clone()]
-            .iter()
-            .map(|&corner| {
-                let corner = usize::try_from(corner).ok();
-                corner.and_then(|corner| triangles.vertices.get(corner).copied())
-            });
-        let hull = hull.collect::<Option<Vec<[f64; 3]>>>().ok_or_else(|| {
+        let corners = self.corners[self.parts[place][2].clone()].iter();
+        let corners = corners.map(|&corner| {
+            let corner = usize::try_from(corner).ok();
+            corner.filter(|&corner| corner < triangles.vertices.len())
+        });
+        let corners = corners.collect::<Option<Vec<usize>>>().ok_or_else(|| {
             let fault = "has a hull with corners that are not there".to_owned();
             self.file.fault(fault)
         })?;
-        let mesh = Mesh::of(
+        let points = triangles.vertices.clone();
+        let hull: Vec<[f64; 3]> = corners.iter().map(|&corner| points[corner]).collect();
+        let most = options.max_hull_vertices;
+        let mut mesh = Mesh::of(
             &self.names[place],
             triangles,
             (!hull.is_empty()).then_some(&hull[..]),
             &MeshOptions {
-                max_hull_vertices: options.max_hull_vertices,
+                max_hull_vertices: most,
                 convex_decomposition: false,
                 collada_up_axis: false,
             },
         )?;
+        let is_whole = (1..=most).contains(&hull.len());
+        let whole = |own: Hull| match is_whole && !own.flat {
+            true => as_mujoco(own, &points, &corners, &self.polygons[place]),
+            false => own,
+        };
+        mesh.hulls = mesh.hulls.into_iter().map(whole).collect();
         Ok(Shape::Mesh(Arc::new(mesh)))
     }
 }

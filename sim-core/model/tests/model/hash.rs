@@ -10,7 +10,7 @@ use sim_model::{Body, Collision, Description, Pose, Robot, Shape, UrdfOptions};
 /// Hash of [`lesson`], as its recordings have it.
 const LESSON: u64 = 17994171291502531716;
 /// Hash of [`table_with_cubes`].
-const CONTACTS: u64 = 15649750293003757519;
+const CONTACTS: u64 = 8815387494124494041;
 
 /// The scene of `examples/lesson`, demo `Target`: an FR3 with drives and without contacts.
 fn lesson() -> Description {

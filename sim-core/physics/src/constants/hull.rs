@@ -33,4 +33,16 @@ pub struct HullTables {
     pub cluster_rows: Fixed,
     /// Centre of a cluster, and radius of a ball about it that holds its vertices. `(clusters, 4)` [m]
     pub clusters: Fixed,
+    /// Of each of the four vertices of a row, its place in the order in which equally deep ones count. With the tables below it
+    /// has rows where a plane touches hulls as in MuJoCo. `(rows, 4)`
+    pub ranks: Fixed,
+    /// Of each vertex: its first row in `fans`, and how many. `(4 * rows, 2)`
+    pub fan_spans: Fixed,
+    /// Of each hull, most rows of a vertex in `fans`. Indices. `(hulls, 1)`
+    pub fan_sizes: Fixed,
+    /// Of each vertex and polygon beside it: outward unit normal, then the places in `vertices` of up to three corners that span
+    /// a large part of the polygon with the vertex; the vertex itself where there are fewer. `(rows, 6)` [–]
+    pub fans: Fixed,
+    /// Of each hull, what MuJoCo takes for its centre, in its frame. `(hulls, 3)` [m]
+    pub origins: Fixed,
 }

@@ -11,6 +11,7 @@
 //! | Pairs | Method | File |
 //! |---|---|---|
 //! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
+//! | plane and hull | the deepest vertex, with corners of a polygon beside it or others | `plane_hull` |
 //! | capsule and box, of models from MuJoCo | MuJoCo's choice of features | `capsule_box` |
 //! | box and box | separating axes, clipping | `boxes`, `box_faces` |
 //! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |

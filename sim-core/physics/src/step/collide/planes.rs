@@ -5,12 +5,20 @@
 use super::narrow::ShapePair;
 use super::points::Points;
 use super::select::{select, sign};
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::Vec3;
 
+/// Half the side of an equilateral triangle in a circle, relative to its radius: √3/2.
+const SIDE: f64 = 0.866_025_403_784_438_6;
+
 /// Sine between a cylinder's axis and the normal below which it stands upright: its first rim point is then on its x axis.
-/// Above the rounding of `f32`; the height of the rim is wrong by at most that part of the radius.
-const UPRIGHT: f64 = 2e-6;
+/// MuJoCo's `mjMINVAL`, or above the rounding of `f32`: the height of the rim is wrong by at most that part of the radius.
+const fn upright<F: Num>() -> f64 {
+    match F::Real::EPSILON > 1e-10 {
+        true => 2e-6,
+        false => 1e-15,
+    }
+}
 
 /// Adds the contact of a point of a shape with the plane, half-way between both.
 #[inline(always)]
@@ -77,34 +85,36 @@ pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>
     }
 }
 
-/// Plane and cylinder: four points on the rim of the lower cap, one of them the lowest, and the point of the upper rim above
-/// that one (as MuJoCo's `mjc_PlaneCylinder`, which has a triangle in place of the square).
+/// Plane and cylinder: the lowest point of the lower rim, the point of the upper rim above it, and two points of the lower rim
+/// that make an equilateral triangle with the first (MuJoCo: `mjc_PlaneCylinder`).
 #[inline(always)]
 pub fn plane_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let c = C::F::c;
     let (normal, b) = (pair.axes_a[2], pair.pose_b);
     let (radius, half_height) = (pair.b.radius(), pair.b.half_height());
     let height = normal.dot(b.center);
-    let down = b.axes[2] * -sign(normal.dot(b.axes[2]));
+    // of a cylinder that lies the end of the axis is the lower one
+    let points_up = c(4.0 * <C::F as Num>::Real::EPSILON).lt(normal.dot(b.axes[2]));
+    let down = select(points_up, -b.axes[2], b.axes[2]);
     let cosine = normal.dot(down);
     // the part of -normal across the axis points to the lowest point of the rim
     let across = (down * cosine) - normal;
     let sine = across.dot(across).sqrt();
-    let upright = sine.lt(c(UPRIGHT));
+    let upright = sine.lt(c(upright::<C::F>()));
     let unit = c(1.0).div(C::F::select(upright, c(1.0), sine));
     let rim = select(upright, b.axes[0], across * unit) * radius;
-    let side = down.cross(rim);
+    let side = down.cross(rim) * c(SIDE);
     let lower_cap = down.scale_add(half_height, b.center);
     let upper_cap = down.scale_add(-half_height, b.center);
-    let reach = half_height * cosine;
-    // heights of the two rim directions
-    let (fall, lean) = (normal.dot(rim), normal.dot(side));
+    let opposite = rim.scale_add(c(-0.5), lower_cap);
+    // heights of the axis above its middle, and of the rim's directions above a cap
+    let (reach, fall, lean) = (half_height * cosine, normal.dot(rim), normal.dot(side));
+    let far = fall.fma(c(-0.5), height + reach);
     for (at, distance) in [
         (lower_cap + rim, height + reach + fall),
         (upper_cap + rim, height - reach + fall),
-        (lower_cap + side, height + reach + lean),
-        (lower_cap - side, height + reach - lean),
-        (lower_cap - rim, height + reach - fall),
+        (opposite - side, far - lean),
+        (opposite + side, far + lean),
     ] {
         add_plane_contact(cx, pair, at, distance, out);
     }
