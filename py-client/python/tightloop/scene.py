@@ -107,8 +107,8 @@ class Scene(SceneRandomization):
             pos: Position of the root link in the world [m].
             quat: Orientation of the root link (x, y, z, w).
             floating: Whether the root link moves freely.
-            self_collisions: Whether links of this robot collide with each other; neighbours never do. What a floating or
-                planar joint separates from a fixed link collides with it in any case.
+            self_collisions: Whether links of this robot collide with each other; neighbours never do. What a floating
+                or planar joint separates from a fixed link collides with it in any case.
             strict: Whether to refuse an inertia that no body can have (A + B < C). Otherwise it is balanced as in
                 MuJoCo, with a warning.
             mesh_max_hull_vertices: Largest number of vertices of the convex hull of a collision mesh, 8 to 1024.
