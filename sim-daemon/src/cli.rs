@@ -245,7 +245,7 @@ pub(crate) struct Record {
     #[arg(long)]
     pub(crate) seconds: Option<f64>,
 
-    /// Overwrite an existing file.
+    /// Replace an existing file, once the recording is whole.
     #[arg(long)]
     pub(crate) force: bool,
 }

@@ -17,22 +17,67 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return open(path, OpenOptions::new().write(true))?.write_all(bytes);
     }
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let part = beside(&target);
-    let write = || {
-        let mut file = File::create_new(&part)?;
+    let mut part = Part::new(path)?;
+    part.file.write_all(bytes)?;
+    part.keep()
+}
+
+/// A file in the making, beside its place: dropping it removes it, and what was in its place stays.
+pub(crate) struct Part {
+    file: File,
+    path: PathBuf,
+    target: PathBuf,
+    kept: bool,
+}
+
+impl Part {
+    /// Makes an empty one with the permissions of what it is to replace. A link stays and its target is replaced.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn new(place: &Path) -> io::Result<Part> {
+        let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
+        let path = beside(&target);
+        let part = Part {
+            file: File::create_new(&path)?,
+            path,
+            target,
+            kept: false,
+        };
         // first: what it replaces may be private
-        if let Ok(there) = fs::metadata(&target) {
-            file.set_permissions(there.permissions())?;
+        if let Ok(there) = fs::metadata(&part.target) {
+            part.file.set_permissions(there.permissions())?;
         }
-        file.write_all(bytes)?;
+        Ok(part)
+    }
+
+    /// The file to write, for a thread of its own.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub(crate) fn file(&self) -> io::Result<File> {
+        self.file.try_clone()
+    }
+
+    /// Puts it in its place.
+    ///
+    /// # Errors
+    /// What the system says; what was there stays.
+    pub(crate) fn keep(mut self) -> io::Result<()> {
         // or a power cut might leave the name with nothing behind it
-        file.sync_all()?;
-        fs::rename(&part, &target)
-    };
-    write().inspect_err(|_| {
-        let _ = fs::remove_file(&part);
-    })
+        self.file.sync_all()?;
+        fs::rename(&self.path, &self.target)?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        if !self.kept {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 /// A path in the same folder, of a name that nobody else has.

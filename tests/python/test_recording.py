@@ -144,6 +144,41 @@ def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pend
         assert "7 frames" in replay(out)[1]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a limit on the size of files stands for a full disk")
+def test_a_forced_recording_that_is_not_whole_leaves_the_old_one(pendulum, tmp_path):
+    out, link = tmp_path / "run.tlrec", tmp_path / "link.tlrec"
+    link.symlink_to(out)
+
+    with tl.launch(pendulum, worlds=WORLDS) as sim:
+        recorder = Recorder(sim, out, "--frames", "30")
+        for _ in range(30):
+            sim.step()
+        recorder.finish()
+        old = out.read_bytes()
+        recorder = Recorder(sim, link, "--force")
+        sim.step()
+        recorder.process.kill()
+        recorder.process.communicate()
+        assert out.read_bytes() == old
+        # files of at most 16 blocks; a write beyond is an error, as on a full disk
+        limited = ["sh", "-c", "trap '' XFSZ; ulimit -f 16; exec \"$@\"", "sh", *COMMAND]
+        command = [*limited, "record", sim.name, str(link), "--force"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as full:
+            while full.poll() is None:
+                sim.step(joint_f=np.random.default_rng(1).normal(size=(WORLDS, 2)))
+            assert full.stderr is not None
+            said = full.stderr.read()
+        assert full.returncode == 1 and "the old recording stays; make room" in said, said
+        assert out.read_bytes() == old
+        # what was killed left a hidden file, and nothing else did
+        assert len([*tmp_path.iterdir()]) == 3
+        recorder = Recorder(sim, link, "--force", "--frames", "7")
+        for _ in range(7):
+            sim.step()
+        recorder.finish()
+    assert link.is_symlink() and "7 frames" in replay(out)[1]
+
+
 def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_told(pendulum, tmp_path):
     with tl.launch(pendulum, worlds=WORLDS) as sim:
         for flags, ending in (((), signal.SIGINT), (("--seconds", "0.3"), None)):

@@ -4,7 +4,7 @@
 //! so that a replay goes on behind the gap.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, IsTerminal};
+use std::io::{self, ErrorKind, IsTerminal};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use super::records::{Record, RecordedCommand};
 use super::writer::{Stopped, Writer};
 use crate::cli;
 use crate::error::DaemonError;
-use crate::output;
+use crate::output::{self, Part};
 use crate::printer::{self, Printer};
 
 /// Entries are waited for so long before anything else is looked at.
@@ -91,7 +91,7 @@ pub(crate) fn follow(
         .collect();
     let journal = client.journal(&fields, &mut hook)?;
     let news = Printer::stderr()?;
-    let file = create(args)?;
+    let (file, part) = create(args)?;
     let description = client.description();
     let writer = Writer::start(file, frame_bytes(description)).map_err(|error| {
         let problem = error.to_string();
@@ -107,6 +107,7 @@ pub(crate) fn follow(
         fields: &fields,
         journal: Some(journal),
         writer,
+        part,
         news: news.clone(),
         state: Vec::new(),
         tally: Tally::default(),
@@ -159,18 +160,26 @@ fn is_there(path: &Path) -> DaemonError {
     )
 }
 
-fn create(args: &cli::Record) -> Result<File, DaemonError> {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    match args.force {
-        true => options.create(true).truncate(true),
-        false => options.create_new(true),
+/// The file to write, and its place if it is to replace another one, which stays until the recording is whole.
+fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
+    let out = &args.out;
+    let not_made = |error: io::Error| match error.kind() {
+        ErrorKind::AlreadyExists => is_there(out),
+        ErrorKind::NotFound => failed(out, "its folder is not there; make it first"),
+        _ => failed(out, format!("cannot be made: {error}")),
     };
-    output::open(&args.out, &mut options).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => is_there(&args.out),
-        ErrorKind::NotFound => failed(&args.out, "its folder is not there; make it first"),
-        _ => failed(&args.out, format!("cannot be made: {error}")),
-    })
+    if args.force && out.is_file() {
+        // whoever may not write it may not replace it either
+        output::open(out, OpenOptions::new().write(true)).map_err(not_made)?;
+        let part = Part::new(out).map_err(not_made)?;
+        return Ok((part.file().map_err(not_made)?, Some(part)));
+    }
+    let mut options = OpenOptions::new();
+    // a device or a pipe is written to
+    let is_there = args.force && out.exists();
+    options.write(true).create_new(!is_there);
+    let file = output::open(out, &mut options).map_err(not_made)?;
+    Ok((file, None))
 }
 
 /// Bytes of a frame's arrays: no entry is much larger.
@@ -191,6 +200,8 @@ struct Recorder<'a> {
     /// None only while it is replaced.
     journal: Option<Journal>,
     writer: Writer,
+    /// Where the file goes when it is whole, if it replaces another one.
+    part: Option<Part>,
     /// Lines for people; a terminal that stands must not make a gap.
     news: Printer,
     /// The part of a state that has come.
@@ -403,13 +414,28 @@ impl Recorder<'_> {
         let Tally { frames, gaps, lost } = self.tally;
         let out = &self.args.out;
         let bytes = self.writer.close().map_err(|error| {
-            let problem = format!(
-                "cannot be written: {error}; what is there can be replayed, for more make room and record again"
-            );
-            failed(out, problem)
+            let cure = match self.part {
+                Some(_) => "the old recording stays; make room and record again",
+                None => "what is there can be replayed, for more make room and record again",
+            };
+            failed(out, format!("cannot be written: {error}; {cure}"))
         })?;
+        // one that has begun can be replayed, whatever ended it
+        let begun = self.has_begun;
+        let replaces = self.part.is_some();
+        if let Some(part) = self.part.filter(|_| begun) {
+            let stays = |error| {
+                let problem = format!("cannot be replaced: {error}; the old recording stays");
+                failed(out, problem)
+            };
+            part.keep().map_err(stays)?;
+        }
         if let End::Failed(error) = end {
             return Err(error);
+        }
+        if replaces && !begun {
+            let problem = format!("{why}, before a first state came; the old recording stays");
+            return Err(failed(out, problem));
         }
         let gaps = match gaps {
             0 => "no gaps".to_owned(),
