@@ -10,6 +10,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::error::DaemonError;
+use crate::terminal::printable;
 
 /// Largest |joint_q| unless another is asked for, that of MuJoCo (`mjMAXVAL`) [rad or m].
 const JOINT_Q_MAX: f64 = 1e10;
@@ -407,7 +408,7 @@ pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<CliComma
         Err(error) => {
             // help and version go to stdout with code 0, mistakes to stderr with code 2: clap knows
             if error.kind() == ErrorKind::ValueValidation {
-                eprint!("{}", in_our_words(&error.to_string()));
+                eprint!("{}", printable(&in_our_words(&error.to_string())));
             } else {
                 let _ = error.print();
             }

@@ -30,6 +30,7 @@ mod refusal;
 mod server;
 mod session;
 mod snapshot;
+mod terminal;
 mod top;
 mod watchdog;
 

@@ -5,6 +5,8 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use crate::terminal::printable;
+
 pub(crate) use sim_system::files::open_to_write as open;
 
 /// Writes a file beside its place and renames it, so that a full disk leaves what was there before.
@@ -86,13 +88,25 @@ pub(crate) fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".tightloop-{number:016x}"))
 }
 
-/// Prints a result. Whoever reads it may stop reading.
+/// What `top` begins with to draw anew; no other code reaches a terminal.
+const CLEAR: &str = "\x1b[H\x1b[J";
+
+/// Prints a result, with codes for terminals as [`printable`] shows them. Whoever reads it may stop reading.
 ///
 /// # Errors
 /// What the system says, such as that the disk behind standard output is full.
 pub(crate) fn print(text: &[u8]) -> io::Result<()> {
+    let text = String::from_utf8_lossy(text);
+    let (clear, rest) = match text.strip_prefix(CLEAR) {
+        Some(rest) => (CLEAR, rest),
+        None => ("", &*text),
+    };
+    let text = format!("{clear}{}", printable(rest));
     let mut stdout = io::stdout().lock();
-    match stdout.write_all(text).and_then(|()| stdout.flush()) {
+    match stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+    {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
     }

@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use sim_system::{signals, streams};
 
 use crate::error::DaemonError;
+use crate::terminal::printable;
 
 /// Messages that wait at most [–]: the notes of a large scene come at once.
 const QUEUE: usize = 1024;
@@ -121,7 +122,12 @@ fn print(mut target: impl Write, items: &Receiver<Item>, dropped: &AtomicU64) {
         });
         match next {
             Ok(Item::Message(message)) => {
-                let _ = target.write_all(message.as_bytes());
+                // progress returns to the beginning of its line
+                let (back, rest) = match message.strip_prefix('\r') {
+                    Some(rest) => ("\r", rest),
+                    None => ("", &*message),
+                };
+                let _ = target.write_all(format!("{back}{}", printable(rest)).as_bytes());
             }
             Ok(Item::Flushed(done)) => {
                 report_dropped(&mut target, dropped);

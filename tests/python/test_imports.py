@@ -25,7 +25,7 @@ Graph = dict[str, set[str]]
 #: Layers of modules, lowest first. A module imports from its own layer and from lower ones. The longest entry that is
 #: the module or one of its packages decides.
 LAYERS = (
-    ("tightloop.errors",),
+    ("tightloop.errors", "tightloop.terminal"),
     (
         "tightloop.advice",
         "tightloop.array_libraries",

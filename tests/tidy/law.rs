@@ -275,6 +275,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-daemon/src",
         &[
+            "terminal",
             "output",
             "config",
             "error",

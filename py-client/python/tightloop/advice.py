@@ -21,6 +21,7 @@ import numpy as np
 
 from tightloop.errors import TightloopWarning
 from tightloop.frames import FAULTED
+from tightloop.terminal import printable
 
 _OWN = f"{Path(__file__).parent}{os.sep}"
 #: What explains a command that is not finite: the actions of an environment.
@@ -44,7 +45,7 @@ def warn(message: str, *, cause: str | None = None) -> None:
     if cause in _TOLD:
         return
     level, _ = _user()
-    warnings.warn(message, TightloopWarning, stacklevel=level)
+    warnings.warn(printable(message), TightloopWarning, stacklevel=level)
     if len(_TOLD) < _TOLD_MAX and not _is_ignored(message):
         _TOLD.add(cause)
 

@@ -6,9 +6,15 @@ All derive from `TightloopError`. Where Python has a built-in exception for the 
 
 from __future__ import annotations
 
+from tightloop.terminal import printable
+
 
 class TightloopError(Exception):
     """Base class of all exceptions of this package."""
+
+    def __str__(self) -> str:
+        """Return the message; codes for terminals, which names in files may hold, are shown and not obeyed."""
+        return printable(super().__str__())
 
 
 class TightloopWarning(UserWarning):

@@ -13,6 +13,7 @@ from typing import NoReturn
 
 from tightloop import system
 from tightloop.errors import TightloopError
+from tightloop.terminal import printable
 from tightloop.view import dependencies, gate
 
 _WORLDS_MAX = 1024
@@ -72,7 +73,7 @@ def main(arguments: list[str]) -> int:
         server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds, names=names)
     except (TightloopError, OSError) as problem:
         if given.parent is None:
-            print(f"tightloop: {problem}", file=sys.stderr)
+            print(printable(f"tightloop: {problem}"), file=sys.stderr)
         else:
             _answer(type(problem).__name__, str(problem))
         return 1

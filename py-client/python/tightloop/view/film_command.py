@@ -10,6 +10,7 @@ import threading
 
 from tightloop import system
 from tightloop.errors import TightloopError
+from tightloop.terminal import printable
 from tightloop.view.cameras import PRESETS
 
 _EPILOG = """examples:
@@ -96,12 +97,12 @@ def main(arguments: list[str]) -> int:
             progress=tell,
         )
     except (TightloopError, OSError) as problem:
-        print(f"tightloop: {problem}", file=sys.stderr)
+        print(printable(f"tightloop: {problem}"), file=sys.stderr)
         return 1
     if shows:
         print(file=sys.stderr)
     for note in made.notes:
-        print(f"tightloop: {note}", file=sys.stderr)
+        print(printable(f"tightloop: {note}"), file=sys.stderr)
     print(os.fspath(given.out))
     return 0
 
