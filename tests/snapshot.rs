@@ -437,6 +437,52 @@ fn numbers_that_are_not_finite_are_refused_in_the_worlds_asked_for() {
 }
 
 #[test]
+fn quaternions_that_are_no_rotation_are_refused_in_the_worlds_asked_for() {
+    for precision in [Precision::F32, Precision::F64] {
+        let mut run = ball(400.0, precision, 3);
+        let good = run.sim.snapshot();
+        let real = if precision == Precision::F32 { 4 } else { 8 };
+        let record = (good.len() - 40) / 3;
+        // velocities, accelerations and commands of six dofs, then the position of the free joint
+        let first = 40 + record + COUNTERS + (5 * 6 + 3) * real;
+        for (factor, length) in [
+            (0.0, "0.000"),
+            (1e-4, "0.000"),
+            (0.5, "0.500"),
+            (2.0, "2.000"),
+        ] {
+            let mut bytes = good.clone();
+            for i in 0..4 {
+                let at = first + i * real;
+                match precision {
+                    Precision::F32 => {
+                        let value = f32::from_le_bytes(bytes[at..][..4].try_into().unwrap());
+                        bytes[at..][..4].copy_from_slice(&(factor as f32 * value).to_le_bytes());
+                    }
+                    Precision::F64 => {
+                        let value = f64::from_le_bytes(bytes[at..][..8].try_into().unwrap());
+                        bytes[at..][..8].copy_from_slice(&(factor * value).to_le_bytes());
+                    }
+                }
+            }
+            // the checksum follows
+            let word = u32::from_le_bytes(bytes[first..][..4].try_into().unwrap());
+            let bytes = forged(&bytes, first, word);
+            let length = length.to_owned();
+            let expected = SnapshotError::Quaternion { world: 1, length };
+            assert_eq!(refused(&mut run, &bytes, None, None), expected);
+            assert_eq!(refused(&mut run, &bytes, None, Some(1)), expected);
+            run.sim.restore(&bytes, None, Some(2)).unwrap();
+            let others = [true, false, true];
+            run.sim.restore(&bytes, Some(&others), None).unwrap();
+            run.sim.restore_first(&bytes).unwrap();
+            assert!(run.sim.snapshot() != bytes);
+        }
+        run.sim.restore(&good, None, None).unwrap();
+    }
+}
+
+#[test]
 fn a_scene_in_which_nothing_moves_has_snapshots_too() {
     let mut scene = Description::new(1.0 / 480.0, 1);
     scene.add_ground("ground", 0.0);

@@ -273,20 +273,25 @@ impl Simulation {
         mask: Option<&[bool]>,
         from_world: Option<usize>,
     ) -> Result<(), SnapshotError> {
-        let records = snapshot::check(bytes, &self.head(), mask, from_world)?;
+        let records = snapshot::check(bytes, &self.head(), &self.quaternions(), mask, from_world)?;
         self.backend.restore(records, mask, from_world);
         Ok(())
     }
 
-    /// Sets all worlds to the first ones of a snapshot, which may have more, for observers. A world that is not finite in the snapshot
-    /// stays as it is, and the checksum is not compared.
+    /// Sets all worlds to the first ones of a snapshot, which may have more, for observers. A world that is not finite in the snapshot,
+    /// or has no rotation, stays as it is, and the checksum is not compared.
     ///
     /// # Errors
     /// Bytes that are no snapshot, or not of this model and precision, or of fewer worlds; nothing is changed then.
     pub fn restore_first(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
-        let (records, are_finite) = snapshot::first(bytes, &self.head())?;
-        self.backend.restore(records, Some(&are_finite), None);
+        let (records, are_sound) = snapshot::first(bytes, &self.head(), &self.quaternions())?;
+        self.backend.restore(records, Some(&are_sound), None);
         Ok(())
+    }
+
+    /// Places of quaternions in the scalars of a world in a snapshot.
+    fn quaternions(&self) -> Vec<usize> {
+        snapshot::quaternions(self.model.constants().quaternions(), self.model.dofs())
     }
 
     fn head(&self) -> Head {

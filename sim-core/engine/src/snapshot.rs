@@ -114,6 +114,16 @@ pub enum SnapshotError {
         /// First world concerned, in the snapshot.
         world: usize,
     },
+    /// A rotation that no simulation leaves.
+    #[error(
+        "world {world} of the snapshot holds a quaternion of length {length}, where a simulation keeps length 1; leave it out by the mask, or take another snapshot"
+    )]
+    Quaternion {
+        /// First world concerned, in the snapshot.
+        world: usize,
+        /// Its length, to three digits [–].
+        length: String,
+    },
 }
 
 /// What a snapshot is of.
@@ -161,6 +171,9 @@ pub(crate) fn write(head: &Head, bytes: &mut [u8], fill: impl FnOnce(&mut [u8]))
 /// Arrays of a record with a scalar for each dof, before the positions: velocities, accelerations and commands.
 const DOF_ARRAYS: usize = 5;
 
+/// How far the squared length of a quaternion may be from 1 [–]: a step normalizes, which leaves some 1e-7 in f32.
+const UNIT: f64 = 1e-3;
+
 /// Joint positions of all worlds of a snapshot of this head, `(worlds, coords)` [rad or m].
 pub(crate) fn positions(bytes: &[u8], head: &Head, dofs: usize, coords: usize) -> Vec<f64> {
     let (real, first) = (head.real(), DOF_ARRAYS * dofs);
@@ -169,11 +182,30 @@ pub(crate) fn positions(bytes: &[u8], head: &Head, dofs: usize, coords: usize) -
         let positions = &record[COUNTERS + first * real..][..coords * real];
         positions.chunks_exact(real)
     });
-    let number = |bytes: &[u8]| match *bytes {
+    numbers.map(number).collect()
+}
+
+/// A scalar of a record.
+fn number(bytes: &[u8]) -> f64 {
+    match *bytes {
         [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
         _ => f64::from_le_bytes(std::array::from_fn(|i| bytes[i])),
-    };
-    numbers.map(number).collect()
+    }
+}
+
+/// Places in the scalars of a record of quaternions that begin at these coordinates.
+pub(crate) fn quaternions(coords: impl Iterator<Item = usize>, dofs: usize) -> Vec<usize> {
+    coords.map(|coord| DOF_ARRAYS * dofs + coord).collect()
+}
+
+/// Length of the first quaternion of a record, at these places, that is no rotation [–].
+fn length_of_none(record: &[u8], real: usize, quaternions: &[usize]) -> Option<f64> {
+    let squares = quaternions.iter().map(|place| {
+        let quaternion = record[COUNTERS + place * real..][..4 * real].chunks_exact(real);
+        quaternion.map(|x| number(x).powi(2)).sum::<f64>()
+    });
+    let mut wrong = squares.filter(|square| (square - 1.0).abs() > UNIT);
+    wrong.next().map(f64::sqrt)
 }
 
 /// Records of a snapshot that fits a simulation, which `here` describes, and may be restored in the worlds of the mask
@@ -184,6 +216,7 @@ pub(crate) fn positions(bytes: &[u8], head: &Head, dofs: usize, coords: usize) -
 pub(crate) fn check<'a>(
     bytes: &'a [u8],
     here: &Head,
+    quaternions: &[usize],
     mask: Option<&[bool]>,
     from_world: Option<usize>,
 ) -> Result<&'a [u8], SnapshotError> {
@@ -206,22 +239,25 @@ pub(crate) fn check<'a>(
         return Err(SnapshotError::Mask { got, worlds });
     }
     let records = &bytes[HEAD..];
-    let is_finite = |world: usize| {
-        let record = &records[world * here.record()..][..here.record()];
-        is_finite(&record[COUNTERS..], here.precision)
-    };
-    let mut sources = match from_world {
+    let sources = match from_world {
         Some(world) => world..world + 1,
         None => 0..worlds,
     };
-    let is_taken = |world: usize| from_world.is_some() || mask.is_none_or(|mask| mask[world]);
-    match sources.find(|&world| is_taken(world) && !is_finite(world)) {
-        Some(world) => Err(SnapshotError::NotFinite { world }),
-        None => Ok(records),
+    let is_taken = |world: &usize| from_world.is_some() || mask.is_none_or(|mask| mask[*world]);
+    for world in sources.filter(is_taken) {
+        let record = &records[world * here.record()..][..here.record()];
+        if !is_finite(&record[COUNTERS..], here.precision) {
+            return Err(SnapshotError::NotFinite { world });
+        }
+        if let Some(length) = length_of_none(record, here.real(), quaternions) {
+            let length = format!("{length:.3}");
+            return Err(SnapshotError::Quaternion { world, length });
+        }
     }
+    Ok(records)
 }
 
-/// Records of a snapshot of as many worlds as a simulation, or more, and which of the simulation's worlds are finite there. For
+/// Records of a snapshot of as many worlds as a simulation, or more, and which of the simulation's worlds are sound there. For
 /// observers: it never left memory, so its checksum is not compared.
 ///
 /// # Errors
@@ -229,6 +265,7 @@ pub(crate) fn check<'a>(
 pub(crate) fn first<'a>(
     bytes: &'a [u8],
     here: &Head,
+    quaternions: &[usize],
 ) -> Result<(&'a [u8], Vec<bool>), SnapshotError> {
     let (got, expected) = (fit(bytes, here, false)?, here.worlds);
     if got < expected {
@@ -236,8 +273,11 @@ pub(crate) fn first<'a>(
     }
     let records = &bytes[HEAD..];
     let own = records.chunks_exact(here.record()).take(expected);
-    let are_finite = own.map(|record| is_finite(&record[COUNTERS..], here.precision));
-    Ok((records, are_finite.collect()))
+    let are_sound = own.map(|record| {
+        is_finite(&record[COUNTERS..], here.precision)
+            && length_of_none(record, here.real(), quaternions).is_none()
+    });
+    Ok((records, are_sound.collect()))
 }
 
 /// Worlds of a snapshot that fits the model and precision of `here`; `is_summed` compares the checksum.
