@@ -70,6 +70,7 @@ mod workers;
 pub use adapter::open_as_discrete;
 pub use adapter::{AdapterInfo, AdapterKind, Choice, adapters};
 pub use batch::{Batch, BatchBuilder, Replay};
+pub use cache::bound;
 pub use device::Device;
 pub use error::DeviceError;
 pub use memory::{Buffer, Read, Staging, Write};

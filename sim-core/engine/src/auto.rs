@@ -25,6 +25,8 @@ const FRAMES_MAX: usize = 64;
 const LIMIT: Duration = Duration::from_millis(500);
 /// Kept rates within this factor are measured again: other work on the computer may have put them in the wrong order.
 const CLOSE: f64 = 1.3;
+/// Most bytes of kept rates: thousands of scenes.
+const RATES_MAX: u64 = 1 << 20;
 
 /// What both sides are to run.
 pub(crate) struct Question<'a> {
@@ -208,6 +210,7 @@ impl Question<'_> {
         if std::fs::write(&draft, text).is_err() || std::fs::rename(&draft, &path).is_err() {
             let _ = std::fs::remove_file(&draft);
         }
+        sim_device::bound(folder, "auto-", RATES_MAX);
     }
 }
 
