@@ -46,7 +46,7 @@ def pipe(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["pipe", "/dev/zero", "/dev/null", "folder"])
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero", "/dev/null", "/proc/self/maps", "folder"])
 def test_what_is_no_file_is_refused_by_name_and_not_waited_for(tmp_path, pipe, name):
     (tmp_path / "folder").mkdir()
     path = tmp_path / name
