@@ -42,6 +42,13 @@ impl LaneAssignment {
         self.world[lane]
     }
 
+    /// Whether each of some lanes has a world, which is in that lane alone, as in a permutation.
+    #[inline(always)]
+    pub fn is_one_to_one(&self, mut lanes: Range<usize>) -> bool {
+        let worlds = self.kinds.len();
+        lanes.all(|lane| self.lane[..worlds].get(self.world[lane]) == Some(&lane))
+    }
+
     /// The worlds of some lanes, if they are consecutive.
     pub fn consecutive(&self, lanes: Range<usize>) -> Option<Range<usize>> {
         let worlds = &self.world[lanes];
@@ -94,5 +101,28 @@ impl LaneAssignment {
                 swap(lane, other);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grouped_assignment_is_one_to_one_and_a_damaged_one_is_not() {
+        let mut assignment = LaneAssignment::new(13, 16);
+        for world in 0..13 {
+            assignment.note(world, (world * 7 % 3) as Kind);
+        }
+        assignment.group(|_, _| {});
+        assert!(assignment.is_one_to_one(0..13));
+        assert!(!assignment.is_one_to_one(12..14), "lane 13 has no world");
+        assert_ne!(assignment.world, (0..16).collect::<Vec<_>>());
+        // two lanes of one world
+        assignment.world[4] = assignment.world[9];
+        assert!(!assignment.is_one_to_one(0..8));
+        assert!(assignment.is_one_to_one(8..13));
+        assignment.world[4] = usize::MAX;
+        assert!(!assignment.is_one_to_one(0..8));
     }
 }

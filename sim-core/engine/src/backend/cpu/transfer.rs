@@ -94,6 +94,11 @@ pub(super) unsafe fn export<F: Lane>(
     let cx = &mut Cpu::new(&mut chunk.memory, &m.contacts.tables);
     gather(cx, m, &chunk.block, slot.field, &mut chunk.staging[..n]);
     let (lanes, first) = (chunk.lanes_of(block), chunk.worlds.start);
+    // rows are disjoint, as the caller promises, only if no world is in two lanes
+    assert!(
+        chunk.assignment.is_one_to_one(lanes.clone()),
+        "the assignment of worlds to lanes is no permutation"
+    );
     if let Some(worlds) = chunk.assignment.consecutive(lanes.clone()) {
         let worlds = first + worlds.start..first + worlds.end;
         // SAFETY: by contract.
