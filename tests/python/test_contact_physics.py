@@ -456,6 +456,27 @@ def test_links_touch_each_other_if_asked_and_neighbours_never(tmp_path, self_col
     assert touching_pairs(scene) == across | own
 
 
+WITH_FLOOR = """<robot name="w"><link name="base"/>
+<link name="floor"><collision><origin xyz="0 0 -.05"/><geometry><box size="2 2 .1"/></geometry></collision></link>
+<joint name="holds" type="fixed"><parent link="base"/><child link="floor"/></joint>
+<link name="ball">{inertial}<collision><geometry><sphere radius=".1"/></geometry></collision></link>
+<joint name="free" type="floating"><parent link="base"/><child link="ball"/><origin xyz="0 0 .3"/></joint></robot>
+""".format(inertial=ARM[ARM.index("<inertial>") : ARM.index("</inertial>")] + "</inertial>")
+
+
+@PRECISIONS
+@pytest.mark.parametrize("self_collisions", [False, True])
+def test_a_ball_rests_on_the_fixed_floor_of_its_own_file(tmp_path, self_collisions, precision):
+    (tmp_path / "w.urdf").write_text(WITH_FLOOR)
+    scene = tl.Scene(dt=1 / 480, substeps=8)
+    scene.add_urdf(tmp_path / "w.urdf", name="w", self_collisions=self_collisions)
+    with tl.launch(scene, worlds=1, precision=precision, fields=STATE) as sim:
+        frame = after(sim, 120)
+    # MuJoCo C: 0.0996
+    assert frame.joint_q[0, 2] == pytest.approx(0.0996, abs=1e-4)
+    assert np.abs(frame.joint_qd[0]).max() < 1e-3
+
+
 @PRECISIONS
 def test_a_ball_far_from_the_origin_rests_as_one_at_the_origin(precision):
     # a pair is seen from its own shapes: a kilometre away f32 keeps no tenths of a millimetre of the world's axes
