@@ -341,7 +341,7 @@ pub(crate) struct Top {
 /// Arguments of `inspect` as given; `inspect` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Inspect {
-    /// URDF or MJCF file of the robot, or a model that a scene with MuJoCo models saved.
+    /// URDF or MJCF file of the robot, a mesh, or a model that a scene with MuJoCo models saved.
     #[arg(value_name = "URDF|MJCF|MODEL.safetensors")]
     pub(crate) file: PathBuf,
 

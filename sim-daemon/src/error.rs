@@ -58,6 +58,16 @@ pub enum DaemonError {
         /// How many.
         count: usize,
     },
+    /// A file that holds no robot.
+    #[error("{}: it is {what}, not a robot; {cure}", path.display())]
+    NoRobot {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What it is.
+        what: &'static str,
+        /// What to do with it.
+        cure: &'static str,
+    },
     /// The picture cannot be written.
     #[error("picture {}: {problem}", path.display())]
     Picture {
@@ -175,7 +185,7 @@ impl DaemonError {
                 | ProtocolError::Memory { .. }
                 | ProtocolError::Descriptors { .. },
             ) => "ResourceError",
-            Read { .. } | Config(_) | Model(_) | Refused { .. } => "SceneError",
+            Read { .. } | Config(_) | Model(_) | Refused { .. } | NoRobot { .. } => "SceneError",
             Recording { .. } | Replay { .. } | Differs { .. } | Gap { .. } => "RecordingError",
             State { .. } => "SnapshotError",
             NeedsPython { .. } => "MissingLibrary",

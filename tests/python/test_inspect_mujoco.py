@@ -147,3 +147,40 @@ def test_a_urdf_file_may_end_in_xml(tmp_path):
     path = file_of(tmp_path, '<robot name="r"><link name="only"/></robot>')
     done = inspected(tmp_path, path)
     assert done.returncode == 0 and done.stdout.startswith("Robot      r\n")
+
+
+ARM = '<body name="arm"><joint/><geom size=".1"/></body>'
+FREE = '<body name="{0}" pos="0 0 1"><freejoint/><geom size=".1" mass="1"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("bodies", "floating", "base"),
+    [
+        (FREE.format("dog"), True, "floating base"),
+        (FREE.format("a") + FREE.format("b"), True, "2 floating bodies"),
+        (ARM, False, "fixed base"),
+        (ARM + FREE.format("cube"), False, "fixed base and 1 floating body"),
+    ],
+)
+def test_a_model_on_a_free_joint_has_a_floating_base(tmp_path, bodies, floating, base):
+    text = f'<mujoco><worldbody><geom type="plane" size="0 0 1"/>{bodies}</worldbody></mujoco>'
+    done = inspected(tmp_path, file_of(tmp_path, text), "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["floating"], found["base"]) == (floating, base)
+
+
+@pytest.mark.parametrize("seen", ["touches", "looks"])
+def test_a_robot_on_a_field_fills_its_picture(tmp_path, seen):
+    image = pytest.importorskip("PIL.Image")
+    quiet = ' contype="0" conaffinity="0"' if seen == "looks" else ""
+    text = f"""<mujoco>
+    <asset><hfield name="hills" nrow="3" ncol="3" size="40 40 .1 .1" elevation="0 1 0 1 0 1 0 1 0"/></asset>
+    <worldbody><geom type="hfield" hfield="hills"/><geom name="wall" type="box" pos="30 0 1" size="1 9 9"/>
+    <body pos="0 0 1"><freejoint/><geom size=".2" mass="1"{quiet}/></body></worldbody></mujoco>"""
+    done = inspected(tmp_path, file_of(tmp_path, text), "--png", "r.png")
+    assert done.returncode == 0, done.stderr
+    # the view from the side: the ball fills it up to its margins
+    side = image.open(tmp_path / "r.png").convert("RGB").crop((1061, 73, 1600, 447))
+    red, _, blue = side.getpixel((269 + 70, 187 - 70))
+    assert blue > red + 30

@@ -9,8 +9,8 @@ use super::mujoco;
 use super::properties::Properties;
 use crate::config::{joint_type, mesh_properties, robot_summary};
 
-/// All there is to say of a robot or a model: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `mass`, `links`,
-/// `picture`.
+/// All there is to say of a robot or a model: what [`crate::config::urdf_summary`] has, and `file`, `floating`, `base`, `mass`,
+/// `links`, `picture`.
 ///
 /// Of a model that MuJoCo compiled also `mujoco`, as [`super::mujoco::json`] has it; a link may have several `joints`.
 ///
@@ -26,7 +26,8 @@ pub(super) fn document(
     let mut document = robot_summary(robot);
     let mut add = |key: &str, value: Value| document[key] = value;
     add("file", path(Some(file)));
-    add("floating", json!(robot.floating));
+    add("floating", json!(properties.is_floating()));
+    add("base", json!(properties.base()));
     add("mass", json!(properties.mass()));
     add(
         "links",

@@ -1,10 +1,11 @@
-//! `tightloop inspect`: what a URDF file or a MuJoCo model means, as text, as JSON, and as a picture of its collision
-//! shapes.
+//! `tightloop inspect`: what a URDF file, a MuJoCo model or a mesh means, as text, as JSON, and as a picture of its
+//! collision shapes.
 
 mod json;
 mod mujoco;
 mod picture;
 mod properties;
+mod shown;
 mod source;
 mod table;
 mod text;
@@ -13,14 +14,12 @@ mod wrap;
 
 use serde_json::json;
 use sim_engine::dynamics::Dynamics;
-use sim_model::geometry::{MeshOptions, triangles};
-use sim_model::{Joint, ModelError, MujocoContents, Pose, Shape};
+use sim_model::geometry::MeshOptions;
+use sim_model::{ModelError, MujocoContents};
 
 use crate::cli::Inspect;
-use crate::config::hull_sides;
 use crate::error::DaemonError;
 use crate::output;
-use picture::Drawing;
 use properties::Properties;
 
 /// Runs the command.
@@ -46,7 +45,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
             }
             source::mujoco(args, path, &name)?
         }
-        _ => source::urdf(args)?,
+        _ => source::other(args)?,
     };
     if let Some(joint_q) = &args.joint_q {
         let wrong = |error: ModelError| DaemonError::Argument {
@@ -63,7 +62,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
     let properties = Properties::new(&scene.robots[0]);
     let path = &args.png;
     let drawn = path.as_deref().map_or(Ok(()), |path| {
-        let drawing = drawing(&properties, &frames, args);
+        let drawing = shown::drawing(&properties, &frames, args, exported)?;
         picture::write(&drawing.render(), path).map_err(|error| DaemonError::Picture {
             path: path.to_owned(),
             problem: format!("{error}; say with --png FILE where to write, or leave it out"),
@@ -111,76 +110,10 @@ fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError
     })
 }
 
-/// What the picture shows. `frames` are position and quaternion of each link, in body order. `(bodies, 7)` [m, –]
-fn drawing(properties: &Properties, frames: &[f64], args: &Inspect) -> Drawing {
-    let robot = properties.robot;
-    let pose = |frame: &[f64]| Pose {
-        pos: std::array::from_fn(|axis| frame[axis]),
-        quat: std::array::from_fn(|part| frame[3 + part]),
-    };
-    let poses: Vec<Pose> = frames.chunks_exact(7).map(pose).collect();
-    let mut shapes = Vec::new();
-    for (place, (&link, pose)) in properties.order.iter().zip(&poses).enumerate() {
-        // a plane has no end; the picture has a floor of its own
-        let own = &robot.links[link].collisions;
-        for collision in own.iter().filter(|own| own.shape != Shape::Plane) {
-            let frame = pose.mul(&collision.pose);
-            let mut draw = |surface| shapes.push((place as u32, frame, surface));
-            match &collision.shape {
-                Shape::Mesh(mesh) if args.hulls => mesh.hulls.iter().map(hull_sides).for_each(draw),
-                shape => draw(triangles(shape)),
-            }
-        }
-    }
-    let outside = properties.outside_range();
-    let mut caption = match &args.joint_q {
-        Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
-        None if robot.mujoco.is_some() => "at the start".to_owned(),
-        None if robot.joints.iter().any(starts_elsewhere) => {
-            "joint_q = 0, mimic joints with their leaders".to_owned()
-        }
-        None => "joint_q = 0".to_owned(),
-    };
-    match outside.as_slice() {
-        [] => {}
-        [one] => caption += &format!(", outside the range of {one}"),
-        [one, rest @ ..] => {
-            caption += &format!(", outside the ranges of {one} and {} more", rest.len());
-        }
-    }
-    let meshes = properties
-        .robot
-        .links
-        .iter()
-        .flat_map(|link| &link.collisions);
-    if meshes
-        .into_iter()
-        .any(|c| matches!(c.shape, Shape::Mesh(_)))
-    {
-        caption += match args.hulls {
-            true => "; convex hulls of meshes",
-            false => "; meshes as their files have them",
-        };
-    }
-    Drawing {
-        title: robot.name.clone(),
-        summary: properties.in_a_line(),
-        caption,
-        links: properties.names(),
-        frames: poses.into_iter().zip(properties.parent_places()).collect(),
-        shapes,
-    }
-}
-
 fn commas(values: &[f64]) -> String {
     values
         .iter()
         .map(f64::to_string)
         .collect::<Vec<_>>()
         .join(",")
-}
-
-/// Whether a mimic joint is not at 0 where its leader is.
-fn starts_elsewhere(joint: &Joint) -> bool {
-    joint.mimic.is_some_and(|mimic| mimic.position(0.0) != 0.0)
 }

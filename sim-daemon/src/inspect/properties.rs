@@ -107,6 +107,50 @@ impl<'a> Properties<'a> {
             .collect()
     }
 
+    /// Links whose joint is the first that moves above them, and whether it is free.
+    fn roots(&self) -> impl Iterator<Item = bool> {
+        let is_root = |&&link: &&usize| {
+            let moves = self.joints(link).any(Joint::moves);
+            let parent = self.joint(link).and_then(|joint| joint.parent);
+            moves && parent.is_none_or(|parent| self.is_fixed(parent))
+        };
+        let is_free = |&link: &usize| {
+            let mut joints = self.joints(link);
+            joints.any(|joint| joint.kind == JointKind::Free)
+        };
+        self.order.iter().filter(is_root).map(is_free)
+    }
+
+    /// Whether nothing moves a link.
+    fn is_fixed(&self, link: usize) -> bool {
+        let mut link = Some(link);
+        while let Some(own) = link {
+            if self.joints(own).any(Joint::moves) {
+                return false;
+            }
+            link = self.joint(own).and_then(|joint| joint.parent);
+        }
+        true
+    }
+
+    /// Whether everything that moves is free, of a URDF file its root.
+    pub fn is_floating(&self) -> bool {
+        let all_free = || self.roots().count() > 0 && self.roots().all(|is_free| is_free);
+        self.robot.floating || (self.robot.mujoco.is_some() && all_free())
+    }
+
+    /// What holds the robot.
+    pub fn base(&self) -> String {
+        let free = self.roots().filter(|&is_free| is_free).count();
+        match (self.is_floating(), free) {
+            (true, ..2) => "floating base".to_owned(),
+            (true, bodies) => format!("{bodies} floating bodies"),
+            (false, 0) => "fixed base".to_owned(),
+            (false, 1) => "fixed base and 1 floating body".to_owned(),
+            (false, bodies) => format!("fixed base and {bodies} floating bodies"),
+        }
+    }
+
     /// The robot in a line.
     pub fn in_a_line(&self) -> String {
         let shapes = self.robot.links.iter().map(|l| l.collisions.len()).sum();
@@ -114,11 +158,7 @@ impl<'a> Properties<'a> {
             "{}, {}, {}, {} kg, {}",
             count(self.order.len(), "link"),
             count(self.dofs(), "dof"),
-            if self.robot.floating {
-                "floating base"
-            } else {
-                "fixed base"
-            },
+            self.base(),
             short(self.mass()),
             count(shapes, "collision shape"),
         )

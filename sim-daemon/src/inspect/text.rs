@@ -22,7 +22,7 @@ pub(super) fn document(
     long: bool,
 ) -> String {
     let mut text = match contents {
-        None => head(properties),
+        None => head(properties, file),
         Some(contents) => mujoco::head(contents, &properties.robot.name, file),
     };
     text += "\nTree (● moves by itself, ○ is part of the link it is fixed to)\n";
@@ -37,22 +37,21 @@ pub(super) fn document(
     text
 }
 
-fn head(properties: &Properties) -> String {
+fn head(properties: &Properties, file: &Path) -> String {
     let robot = properties.robot;
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<10} {value}");
     };
     line("Robot", robot.name.clone());
-    if let Some(file) = &robot.urdf {
-        line("File", file.display().to_string());
-    }
-    let base = if robot.floating {
-        "moves freely"
-    } else {
-        "fixed to the world"
+    let file = robot.urdf.as_deref().unwrap_or(file);
+    line("File", file.display().to_string());
+    let base = match (robot.floating, properties.base().as_str()) {
+        (true, _) => "moves freely".to_owned(),
+        (false, "fixed base") => "fixed to the world".to_owned(),
+        (false, base) => base.replace("fixed base", "fixed to the world"),
     };
-    line("Base", base.to_owned());
+    line("Base", base);
     let merged = (0..robot.links.len())
         .filter(|&link| properties.merged_into(link).is_some())
         .count();

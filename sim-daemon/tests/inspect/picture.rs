@@ -227,3 +227,32 @@ fn a_mesh_is_drawn_as_it_is_or_as_what_stands_for_it_in_contacts() {
     assert_eq!(all["links"][0]["collisions"][0]["hull_vertices"][0], 10);
     assert_eq!(all["links"][0]["collisions"][0]["triangles"], 20);
 }
+
+#[test]
+fn a_robot_without_collisions_is_drawn_as_it_looks() {
+    let folder = Folder::new("looks");
+    let looks = ball(1.0).replace("collision", "visual");
+    folder.file("a.urdf", &one_link("r", &looks));
+    assert_eq!(inspect(&folder.0, &["a.urdf", "--png", "r.png"]).code, 0);
+    let picture = Picture::read(&folder.0.join("r.png"));
+    let [x, y] = SIDE;
+    assert!(is_blue(picture.at(x + RADIUS / 2, y + RADIUS / 2)));
+    assert!(is_paper(picture.at(x + RADIUS, y + RADIUS)));
+}
+
+#[test]
+fn a_mesh_is_drawn_as_a_body() {
+    let folder = Folder::new("mesh");
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 6 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    folder.file("my part.obj", corners);
+    let said = inspect(&folder.0, &["my part.obj", "--png", "r.png"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    // a cubic metre of water
+    for part in ["my_part", "1000 kg", "1 mesh"] {
+        assert!(said.out.contains(part), "{}", said.out);
+    }
+    let [x, y] = SIDE;
+    assert!(is_blue(
+        Picture::read(&folder.0.join("r.png")).at(x - RADIUS / 2, y + RADIUS / 2)
+    ));
+}

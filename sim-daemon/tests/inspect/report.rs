@@ -222,3 +222,21 @@ fn a_misused_command_line_is_told_so() {
         assert!(said.err.contains(message), "{}", said.err);
     }
 }
+
+#[test]
+fn files_that_hold_no_robot_are_named_with_what_takes_them() {
+    let folder = Folder::new("kinds");
+    for (file, what, cure) in [
+        ("scene.toml", "a scene file", "tightloop serve"),
+        ("run.tlrec", "a recording", "tightloop view"),
+        ("robot.usda", "USD", "export the robot as URDF"),
+    ] {
+        folder.file(file, "dt = 0.002\n");
+        let said = inspect(&folder.0, &[file]);
+        assert_eq!((said.code, said.out.as_str()), (1, ""));
+        for part in [file, what, cure] {
+            assert!(said.err.contains(part), "{}", said.err);
+        }
+        assert!(!said.err.contains("XML"), "{}", said.err);
+    }
+}

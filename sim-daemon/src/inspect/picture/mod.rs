@@ -31,8 +31,10 @@ pub(super) struct Drawing {
     pub links: Vec<String>,
     /// Frame of each link in the world, in body order, and the place of its parent in that order.
     pub frames: Vec<(Pose, Option<usize>)>,
-    /// Collision shapes: place of their link in body order, frame in the world, triangles in that frame.
+    /// Shapes of the robot: place of their link in body order, frame in the world, triangles in that frame.
     pub shapes: Vec<(u32, Pose, TriMesh)>,
+    /// Shapes around the robot, likewise: they are drawn as far as the views of the robot reach.
+    pub surroundings: Vec<(u32, Pose, TriMesh)>,
 }
 
 impl Drawing {

@@ -64,7 +64,7 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn new(drawing: &'a Drawing) -> Scene<'a> {
-        let mut solids = Solids::new(&drawing.shapes, &colours(drawing));
+        let mut solids = Solids::new(&drawing.shapes, &drawing.surroundings, &colours(drawing));
         if drawing.shapes.is_empty() {
             solids.extent = extent(drawing.frames.iter().map(|(frame, _)| frame.pos));
         }

@@ -15,25 +15,32 @@ const NO_TINT: [u8; 4] = [0; 4];
 pub(super) struct Solids {
     renderer: Renderer,
     instances: Vec<Instance>,
-    /// Lowest and highest coordinates [m].
+    /// Lowest and highest coordinates of the robot [m].
     pub extent: [Vector; 2],
-    /// Vertices in the world [m].
+    /// Vertices of the robot in the world [m].
     pub points: Vec<Vector>,
 }
 
 impl Solids {
-    /// The shapes of some links (number of the link, frame of the shape in the world, its triangles), and a colour a link.
-    pub fn new(shapes: &[(u32, Pose, TriMesh)], colours: &[Rgb]) -> Solids {
+    /// The shapes of a robot and those around it (number of the link, frame of the shape in the world, its triangles), and
+    /// a colour a link.
+    pub fn new(
+        shapes: &[(u32, Pose, TriMesh)],
+        around: &[(u32, Pose, TriMesh)],
+        colours: &[Rgb],
+    ) -> Solids {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let mut renderer = Renderer::new(threads);
         let mut points = Vec::with_capacity(shapes.iter().map(|s| s.2.vertices.len()).sum());
-        let mut instances = Vec::with_capacity(shapes.len());
-        for (link, frame, triangles) in shapes {
+        for (_, frame, triangles) in shapes {
             let rows = frame.rotation();
             points.extend(triangles.vertices.iter().map(|&vertex| {
                 let place = |axis: usize| dot(rows[axis], vertex) + frame.pos[axis];
                 std::array::from_fn(place)
             }));
+        }
+        let mut instances = Vec::with_capacity(shapes.len() + around.len());
+        for (link, frame, triangles) in shapes.iter().chain(around) {
             let ([x, y, z], [a, b, c, d]) = (frame.pos, frame.quat);
             instances.push(Instance {
                 mesh: renderer.add(mesh(triangles, colours[*link as usize])),

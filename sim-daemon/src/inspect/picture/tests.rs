@@ -4,6 +4,7 @@ use sim_model::geometry::triangles;
 use sim_model::{Pose, Shape};
 use sim_picture::View;
 
+use super::Drawing;
 use super::canvas::{Canvas, PAPER};
 use super::paper::round_spacing;
 use super::solids::Solids;
@@ -23,6 +24,7 @@ fn shapes_are_drawn_at_their_frames_in_the_colours_of_their_links() {
     };
     let solids = Solids::new(
         &[(1, turned, long), (0, Pose::at([1000.5, 0.0, 0.0]), ball)],
+        &[],
         &[RED, BLUE],
     );
     let expected = [[999.9, -0.3, -0.1], [1000.6, 0.3, 0.1]];
@@ -65,5 +67,27 @@ fn lines_of_a_grid_are_1_2_or_5_apart() {
     ] {
         let found = round_spacing(size, 12.0);
         assert!((found / spacing - 1.0).abs() < 1e-12, "{size}: {found}");
+    }
+}
+
+#[test]
+fn what_is_around_a_robot_leaves_its_views_as_they_are() {
+    let ball = |radius| triangles(&Shape::Sphere { radius });
+    let mut drawing = Drawing {
+        links: vec!["world".to_owned(), "ball".to_owned()],
+        frames: vec![(Pose::identity(), None), (Pose::identity(), Some(0))],
+        shapes: vec![(1, Pose::identity(), ball(1.0))],
+        ..Drawing::default()
+    };
+    let alone = drawing.render();
+    // far behind the ball as the side sees it
+    drawing.surroundings = vec![(0, Pose::at([0.0, 500.0, 400.0]), ball(50.0))];
+    let with = drawing.render();
+    let [left, top] = [1070, 80];
+    for y in top..top + 350 {
+        for x in left..left + 500 {
+            let at = y * alone.width + x;
+            assert_eq!(alone.pixels[at], with.pixels[at], "{x} {y}");
+        }
     }
 }
