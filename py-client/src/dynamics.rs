@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use sim_daemon::config::{self, BackendError, Field};
 
 use crate::errors::raise;
+use crate::interrupt::abandonable;
 
 /// A scene's model. `tightloop.Dynamics` wraps it, checks shapes, and documents its methods.
 #[pyclass(frozen, module = "tightloop._core")]
@@ -21,8 +22,10 @@ impl Dynamics {
     /// From a scene as TOML, with paths relative to a folder.
     #[new]
     fn new(py: Python<'_>, scene: &str, folder: PathBuf) -> PyResult<Dynamics> {
-        let built = py.detach(|| config::parse(scene, "scene")?.dynamics(&folder));
-        let inner = built.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+        let scene = scene.to_owned();
+        let build = move || config::parse(&scene, "scene")?.dynamics(&folder);
+        let inner =
+            abandonable(py, build)?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
         Ok(Dynamics {
             hash: inner.model().hash(),
             inner: Mutex::new(inner),

@@ -6,11 +6,15 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use sim_daemon::config::{
-    self, IkError, IkOptions, IkPrecision, IkProblems, IkSolver, IkTask, IkWidth, Model,
+    self, IkError, IkOptions, IkPrecision, IkProblems, IkSolver, IkStop, IkTask, IkWidth, Model,
     frame_names,
 };
 
 use crate::errors::raise;
+use crate::interrupt::{abandonable, interruptible};
+
+/// Iterations that take less than a second and need no thread of their own [–].
+const SHORT: usize = 100_000;
 
 /// A scene's frames and a solver. `tightloop.IkSolver` wraps it, checks shapes, and documents its methods.
 #[pyclass(frozen, module = "tightloop._core")]
@@ -39,8 +43,10 @@ impl Ik {
     /// From a scene as TOML, with paths relative to a folder.
     #[new]
     fn new(py: Python<'_>, scene: &str, folder: PathBuf) -> PyResult<Ik> {
-        let built = py.detach(|| config::parse(scene, "scene")?.model(&folder));
-        let model = built.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+        let scene = scene.to_owned();
+        let build = move || config::parse(&scene, "scene")?.model(&folder);
+        let model =
+            abandonable(py, build)?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
         Ok(Ik { model })
     }
 
@@ -108,12 +114,17 @@ impl IkTaskSolver {
             true => IkPrecision::F64,
             false => IkPrecision::F32,
         };
-        let solve = || {
+        let solve = |stop: IkStop| {
             let width = IkWidth::Auto;
             self.inner
-                .solve(&problems, options, precision, width, threads)
+                .solve_until(stop, &problems, options, precision, width, threads)
         };
-        let (q, found) = py.detach(solve).map_err(|error| refused(py, &error))?;
+        let is_short = count.saturating_mul(iterations) < SHORT / restarts.saturating_add(1);
+        let solved = match is_short {
+            true => py.detach(|| solve(&|| false)),
+            false => interruptible(py, solve)?,
+        };
+        let (q, found) = solved.map_err(|error| refused(py, &error))?;
         Ok((
             PyArray1::from_vec(py, q),
             PyArray1::from_iter(py, found.iter().map(|one| one.is_solved)),

@@ -12,6 +12,7 @@ mod followers;
 mod frame;
 mod ik;
 mod input;
+mod interrupt;
 mod not_finite;
 mod observe;
 mod parts;

@@ -8,6 +8,7 @@ use pyo3::types::{PyBytes, PyDict};
 use sim_daemon::config::{self, ConfigError, Image, Texture, VisualMesh};
 
 use crate::errors::raise;
+use crate::interrupt::abandonable;
 
 /// Corners `(n, 3)` [m] and triangles `(m, 3)`.
 type Surface<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
@@ -20,8 +21,9 @@ pub(crate) fn parts<'py>(
     scene: &str,
     folder: PathBuf,
 ) -> PyResult<(String, Vec<Surface<'py>>)> {
-    let found = py.detach(|| config::parse(scene, "scene")?.parts(&folder));
-    let found = found.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+    let scene = scene.to_owned();
+    let found = abandonable(py, move || config::parse(&scene, "scene")?.parts(&folder));
+    let found = found?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
     let surfaces = found.meshes.iter().map(|mesh| {
         let corners = mesh.vertices.as_flattened();
         let corners = PyArray1::from_iter(py, corners.iter().map(|&part| part as f32));

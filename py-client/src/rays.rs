@@ -10,6 +10,7 @@ use pyo3::types::PyDict;
 use sim_daemon::config::{self, Casting, Hits, Placed, Pose, Ray, RayGeom};
 
 use crate::errors::raise;
+use crate::interrupt::abandonable;
 
 /// Distances in units of the directions, geoms, and normals, each flat.
 type Found<'py> = (
@@ -32,8 +33,10 @@ impl RayScene {
         folder: PathBuf,
         first_bodies: HashMap<String, usize>,
     ) -> PyResult<RayScene> {
-        let built = py.detach(|| config::parse(scene, "scene")?.rays(&folder, &first_bodies));
-        let inner = built.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+        let scene = scene.to_owned();
+        let build = move || config::parse(&scene, "scene")?.rays(&folder, &first_bodies);
+        let inner =
+            abandonable(py, build)?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
         Ok(RayScene(inner))
     }
 

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use sim_daemon::config::{self, ConfigError, MeshOptions, SceneFile, UrdfOptions};
 
 use crate::errors::raise;
+use crate::interrupt::abandonable;
 
 /// Names, defaults and notes of a URDF file as JSON, arrays in dof order.
 #[pyfunction]
@@ -99,9 +100,12 @@ pub(crate) fn parse_scene(py: Python<'_>, text: &str) -> PyResult<String> {
 /// A scene as it is simulated, as JSON (`SceneFile::compiled` says what it has); the scene is TOML with absolute paths.
 #[pyfunction]
 pub(crate) fn compiled_scene(py: Python<'_>, scene: &str) -> PyResult<String> {
-    py.detach(|| config::parse(scene, "scene")?.compiled(Path::new("/")))
-        .map(|compiled| compiled.to_string())
-        .map_err(|error| scene_error(py, &error))
+    let scene = scene.to_owned();
+    abandonable(py, move || {
+        config::parse(&scene, "scene")?.compiled(Path::new("/"))
+    })?
+    .map(|compiled| compiled.to_string())
+    .map_err(|error| scene_error(py, &error))
 }
 
 fn from_json(py: Python<'_>, scene: &str) -> PyResult<SceneFile> {

@@ -8,6 +8,7 @@
 
 use std::fs::OpenOptions;
 use std::io::{Read, Seek, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Deserialize;
 use sim_engine::simulation::Simulation;
@@ -46,7 +47,12 @@ pub(crate) struct Ik {
 
 impl Ik {
     /// Answers the question in the file that the command names.
-    pub(crate) fn answer(&mut self, simulation: &Simulation, inbox: &Inbox) -> Result<(), Refusal> {
+    pub(crate) fn answer(
+        &mut self,
+        simulation: &Simulation,
+        inbox: &Inbox,
+        stop: &AtomicBool,
+    ) -> Result<(), Refusal> {
         let path = snapshot::path(inbox)?;
         let refuse = |problem: String| refused(&format!("{}: {problem}", path.display()));
         let opened = OpenOptions::new().read(true).write(true).open(path);
@@ -61,7 +67,7 @@ impl Ik {
         let mut bytes = Vec::with_capacity(status.len() as usize);
         let read = (&file).take(status.len()).read_to_end(&mut bytes);
         read.map_err(|problem| refuse(format!("cannot be read: {problem}")))?;
-        let answer = self.solve(simulation, &bytes);
+        let answer = self.solve(simulation, &bytes, stop);
         let answer = answer.map_err(|problem| refused(&problem))?;
         let written = file
             .rewind()
@@ -70,7 +76,12 @@ impl Ik {
         written.map_err(|problem| refuse(format!("cannot be written: {problem}")))
     }
 
-    fn solve(&mut self, simulation: &Simulation, bytes: &[u8]) -> Result<Vec<u8>, String> {
+    fn solve(
+        &mut self,
+        simulation: &Simulation,
+        bytes: &[u8],
+        stop: &AtomicBool,
+    ) -> Result<Vec<u8>, String> {
         let (question, task, arrays) =
             parse(bytes).ok_or("the file is no question; use sim.ik")??;
         let [starts, posture, targets @ ..] = &arrays[..] else {
@@ -120,7 +131,9 @@ impl Ik {
             0 => simulation.threads(),
             asked => asked,
         };
-        let solved = solver.solve(&problems, options, precision, Width::Auto, threads);
+        let stop = || stop.load(Ordering::Relaxed);
+        let width = Width::Auto;
+        let solved = solver.solve_until(&stop, &problems, options, precision, width, threads);
         let (joint_q, solutions) = solved.map_err(said)?;
         Ok(rows(coords, &joint_q, &solutions))
     }

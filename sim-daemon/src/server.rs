@@ -131,7 +131,7 @@ fn apply(
     ik: &mut Ik,
 ) -> Result<Advance, Refusal> {
     if host.inbox().op() == Op::Ik {
-        ik.answer(simulation, host.inbox())?;
+        ik.answer(simulation, host.inbox(), host.stop_flag())?;
     }
     let left = device_memory::receive(simulation, host)?;
     let advance = export::apply(simulation, host.inbox(), mask)?;

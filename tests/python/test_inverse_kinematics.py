@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import mujoco
@@ -11,6 +15,7 @@ from test_dynamics import WALKER
 
 import tightloop as tl
 from conftest import URDF
+from processes import started
 
 POSITION, ROTATION = 1e-3, np.radians(0.1)
 HOME = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04, 0.04]
@@ -330,3 +335,53 @@ def sample(model: mujoco.MjModel, random: np.random.Generator) -> np.ndarray:
 def test_mistakes_are_named_with_a_cure(fr3, call, said):
     with pytest.raises(tl.ArgumentError, match=said):
         call(fr3)
+
+
+def test_inverse_kinematics_bounds_its_work_and_names_the_bound(pendulum):
+    target = {"restarts": 10**6}
+    named = r"50 iterations .* 1000001 attempts; .*`iterations` and `restarts`.* 1000000"
+    with pytest.raises(tl.ArgumentError, match=named):
+        tl.ik(pendulum, tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), **target)
+    with tl.launch(pendulum, worlds=2) as sim:
+        with pytest.raises(tl.CommandRefused, match=named):
+            sim.ik(tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), **target)
+        sim.step()
+
+
+SOLVING = """
+solver = tl.ik(scene, tl.Reach("arm/fr3_hand_tcp"))
+print("ready", flush=True)
+solver.solve(np.full((300_000, 3), 9.0), (1, 0, 0, 0), iterations=1000, restarts=900)
+"""
+COMPILING = """
+cube = ("[[body]]\\nname = 'cube%d'\\npos = [%d, 0, 1]\\nmass = 1.0\\n"
+        "[[shape]]\\nname = 'box%d'\\ntype = 'box'\\nhalf_extents = [0.1, 0.1, 0.1]\\nbody = 'cube%d'\\n")
+text = "dt = 0.002\\nsubsteps = 1\\n" + "".join(cube % (i, i, i, i) for i in range(50_000))
+print("ready", flush=True)
+tl._core.Ik(text, "/")
+"""
+
+
+@pytest.mark.parametrize("work", [SOLVING, COMPILING], ids=["solving", "compiling"])
+def test_ctrl_c_ends_inverse_kinematics_in_this_process(work):
+    code = f"""
+import signal
+import numpy as np
+import tightloop as tl
+signal.signal(signal.SIGINT, signal.default_int_handler)
+scene = tl.Scene()
+scene.add_urdf({str(URDF)!r}, name="arm")
+try:
+    exec({work!r})
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    with started([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(1.0)
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "interrupted\n"
+        assert time.monotonic() - began < 2.0
+        process.wait(2.0)

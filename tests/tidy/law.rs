@@ -310,6 +310,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
         "py-client/src",
         &[
             "errors",
+            "interrupt",
             "parts",
             "input",
             "frame",

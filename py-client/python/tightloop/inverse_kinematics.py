@@ -152,7 +152,8 @@ class IkSolver:
             orientation: Target quaternion (x, y, z, w), ``(4,)`` or ``(n, 4)``, in the same forms.
             joint_q: Where the first attempt starts [rad or m], ``(coords,)`` or ``(n, coords)``; the scene's start if
                 left out. Positions beyond limits move to them.
-            iterations: Most iterations of an attempt. One that makes no progress ends earlier.
+            iterations: Most iterations of an attempt. One that makes no progress ends earlier. All attempts at a
+                problem may have a million together.
             restarts: Most attempts after the first.
             tolerance: Position [m] and rotation [rad] that count as reached.
             seed: Seed of the restarts.

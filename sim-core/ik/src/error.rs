@@ -51,6 +51,22 @@ pub enum IkError {
         /// What it has.
         value: f64,
     },
+    /// More iterations than anybody waits for.
+    #[error(
+        "a problem may take {iterations} iterations in each of {attempts} attempts; give `iterations` and `restarts` \
+         whose product is at most {max}"
+    )]
+    Work {
+        /// Of an attempt.
+        iterations: usize,
+        /// The first one and the restarts.
+        attempts: usize,
+        /// The most of a problem.
+        max: usize,
+    },
+    /// Whoever waited wants it no more.
+    #[error("it was stopped before all problems were solved; ask again")]
+    Stopped,
     /// The processor lacks instructions.
     #[error("this processor has no {instructions}; leave the lanes to be chosen")]
     Lanes {

@@ -26,6 +26,6 @@ mod task;
 pub use dispatch::Width;
 pub use error::IkError;
 pub use frames::{frame, frame_names};
-pub use queue::{Options, Problems, Solution};
+pub use queue::{Options, Problems, Solution, Stop};
 pub use solver::{Precision, Solver};
 pub use task::{Reach, Task};

@@ -46,6 +46,12 @@ pub struct Options {
     pub seed: u64,
 }
 
+/// Whether nobody wants the solutions any more. Every thread asks now and then.
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Iterations between two looks at [`Stop`]: some milliseconds.
+const STOP_EVERY: u64 = 1024;
+
 /// What has been found of a problem, beside its state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Solution {
@@ -70,6 +76,7 @@ pub struct Job<'a, R> {
     pub exact: &'a Tables<f64>,
     pub problems: &'a Problems<'a>,
     pub options: Options,
+    pub stop: Stop<'a>,
 }
 
 /// A problem in a lane.
@@ -122,6 +129,9 @@ pub fn run<F: Lane>(
     while busy > 0 {
         let mut ended = lanes.iterate(job.tables);
         clock += 1;
+        if clock.is_multiple_of(STOP_EVERY) && (job.stop)() {
+            return;
+        }
         while ended != 0 {
             let lane = ended.trailing_zeros() as usize;
             ended &= ended - 1;

@@ -3,14 +3,18 @@
 use crate::dispatch::{Width, double, single};
 use crate::error::IkError;
 use crate::plan::Plan;
-use crate::queue::{Job, Options, Problems, Solution};
+use crate::queue::{Job, Options, Problems, Solution, Stop};
 use crate::tables::Tables;
 use crate::task::Task;
 use sim_model::Model;
 use sim_physics::constants::Recast;
 use sim_physics::lane::Real;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
+
+/// Iterations of all attempts at one problem at most: about a second [–].
+const WORK_MAX: usize = 1_000_000;
 
 /// Precision of the iterations. Errors are evaluated in double precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,9 +64,25 @@ impl Solver {
     /// the same bit for bit for any number of problems, lanes and threads.
     ///
     /// # Errors
-    /// [`IkError::Lanes`], [`IkError::Length`], [`IkError::Value`].
+    /// [`IkError::Lanes`], [`IkError::Length`], [`IkError::Value`], [`IkError::Work`].
     pub fn solve(
         &self,
+        problems: &Problems,
+        options: Options,
+        precision: Precision,
+        width: Width,
+        threads: usize,
+    ) -> Result<(Vec<f64>, Vec<Solution>), IkError> {
+        self.solve_until(&|| false, problems, options, precision, width, threads)
+    }
+
+    /// The same, until somebody stops it.
+    ///
+    /// # Errors
+    /// As of [`Solver::solve`], and [`IkError::Stopped`].
+    pub fn solve_until(
+        &self,
+        stop: Stop,
         problems: &Problems,
         options: Options,
         precision: Precision,
@@ -74,19 +94,28 @@ impl Solver {
         let count = problems.count;
         let mut joint_q = vec![0.0; count * coords];
         let mut solutions = vec![Solution::default(); count];
+        let stopped = AtomicBool::new(false);
+        // once it is asked for, no thread asks again
+        let stop = &|| {
+            let stops = stopped.load(Ordering::Relaxed) || stop();
+            stopped.fetch_or(stops, Ordering::Relaxed) || stops
+        };
         match precision {
             Precision::F32 => {
                 let work = single(width)?;
-                let job = self.job(&self.single, problems, options);
+                let job = self.job(&self.single, problems, options, stop);
                 in_threads(&job, work, threads, &mut joint_q, &mut solutions);
             }
             Precision::F64 => {
                 let work = double()?;
-                let job = self.job(&self.double, problems, options);
+                let job = self.job(&self.double, problems, options, stop);
                 in_threads(&job, work, threads, &mut joint_q, &mut solutions);
             }
         }
-        Ok((joint_q, solutions))
+        match stopped.into_inner() {
+            true => Err(IkError::Stopped),
+            false => Ok((joint_q, solutions)),
+        }
     }
 
     /// Refuses arrays of other lengths, and numbers that are none.
@@ -125,6 +154,15 @@ impl Solver {
             finite(&what, array)?;
         }
         finite("tolerance", &options.tolerance)?;
+        let (iterations, attempts) = (options.iterations, options.restarts.saturating_add(1));
+        if iterations.saturating_mul(attempts) > WORK_MAX {
+            let max = WORK_MAX;
+            return Err(IkError::Work {
+                iterations,
+                attempts,
+                max,
+            });
+        }
         match options.tolerance.into_iter().find(|&x| x <= 0.0) {
             Some(value) => Err(IkError::Value {
                 what: "tolerance".to_owned(),
@@ -139,6 +177,7 @@ impl Solver {
         tables: &'a Tables<R>,
         problems: &'a Problems<'a>,
         options: Options,
+        stop: Stop<'a>,
     ) -> Job<'a, R>
     where
         f64: Recast<R, Out = R>,
@@ -150,6 +189,7 @@ impl Solver {
             exact: &self.double,
             problems,
             options,
+            stop,
         }
     }
 }

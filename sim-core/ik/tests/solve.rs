@@ -1,6 +1,6 @@
 //! Solutions on robots from files: beside the kinematics of a step, within limits, and the same bits however they are computed.
 
-use sim_ik::{Options, Precision, Problems, Reach, Solution, Solver, Task, Width, frame};
+use sim_ik::{IkError, Options, Precision, Problems, Reach, Solution, Solver, Task, Width, frame};
 use sim_model::{Description, Model, UrdfOptions};
 use sim_physics::arrays::Block;
 use sim_physics::constants::Motion;
@@ -11,6 +11,7 @@ use sim_physics::step::kinematics::Kinematics;
 use sim_physics::step::poses::Poses;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// 1 mm and 0.1°.
 const TOLERANCE: [f64; 2] = [1e-3, 0.1 * std::f64::consts::PI / 180.0];
@@ -258,6 +259,73 @@ fn a_result_depends_on_no_width_thread_or_number() {
         for (a, b) in other.iter().zip(&found) {
             assert_eq!((a.iterations, a.restarts), (b.iterations, b.restarts));
         }
+    }
+}
+
+#[test]
+fn more_work_than_a_problem_may_have_is_refused_with_the_bound() {
+    let model = fr3();
+    let solver = Solver::new(Arc::clone(&model), &task(&model, &["robot/fr3_hand_tcp"])).unwrap();
+    let start = model.start().joint_q.clone();
+    let (place, turn) = ([[9.0; 3].as_slice()], [[0.0, 0.0, 0.0, 1.0].as_slice()]);
+    let problems = out_of_reach(&start, &place, &turn, 1);
+    for (iterations, restarts) in [
+        (50, 1_000_000),
+        (usize::MAX, 0),
+        (1, usize::MAX),
+        (1001, 999),
+    ] {
+        let options = Options {
+            iterations,
+            restarts,
+            ..OPTIONS
+        };
+        let error = solver.solve(&problems, options, Precision::F32, Width::Auto, 1);
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("`iterations` and `restarts`"), "{error}");
+        assert!(error.contains("at most 1000000"), "{error}");
+    }
+}
+
+#[test]
+fn work_that_is_stopped_ends_soon_in_every_thread_and_precision() {
+    let model = fr3();
+    let solver = Solver::new(Arc::clone(&model), &task(&model, &["robot/fr3_hand_tcp"])).unwrap();
+    let start = model.start().joint_q.clone();
+    let (place, turn) = ([[9.0; 3].as_slice()], [[0.0, 0.0, 0.0, 1.0].as_slice()]);
+    // alone it would take minutes
+    let problems = out_of_reach(&start, &place, &turn, 100_000);
+    let options = Options {
+        iterations: 1000,
+        restarts: 900,
+        ..OPTIONS
+    };
+    for (precision, threads) in [
+        (Precision::F32, 1),
+        (Precision::F64, 1),
+        (Precision::F32, 3),
+    ] {
+        let began = Instant::now();
+        let stop = || began.elapsed() > Duration::from_millis(100);
+        let solved = solver.solve_until(&stop, &problems, options, precision, Width::Auto, threads);
+        assert!(matches!(solved, Err(IkError::Stopped)));
+        assert!(began.elapsed() < Duration::from_secs(5));
+    }
+}
+
+/// The same target for all problems.
+fn out_of_reach<'a>(
+    start: &'a [f64],
+    position: &[&'a [f64]],
+    orientation: &[&'a [f64]],
+    count: usize,
+) -> Problems<'a> {
+    Problems {
+        count,
+        starts: start,
+        postures: &[],
+        positions: position.to_vec(),
+        orientations: orientation.to_vec(),
     }
 }
 

@@ -39,7 +39,7 @@ pub use sim_engine::dynamics::Dynamics;
 pub use sim_engine::random::{Draw, Stream, TASK_STREAMS};
 pub use sim_ik::{
     IkError, Options as IkOptions, Precision as IkPrecision, Problems as IkProblems,
-    Solution as IkSolution, Solver as IkSolver, Width as IkWidth, frame_names,
+    Solution as IkSolution, Solver as IkSolver, Stop as IkStop, Width as IkWidth, frame_names,
 };
 pub use sim_model::UrdfOptions;
 pub use sim_model::geometry::{Image, MeshOptions, Texture, VisualMesh};

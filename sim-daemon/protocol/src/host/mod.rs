@@ -193,6 +193,11 @@ impl Host {
         Ok(next)
     }
 
+    /// Whether somebody asks the daemon to stop: long work on a command looks at it.
+    pub fn stop_flag(&self) -> &AtomicBool {
+        &self.state.stop
+    }
+
     /// The command that [`Host::wait`] has found.
     pub fn inbox(&self) -> &Inbox {
         &self.state.inbox
