@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -9,6 +10,7 @@ import resource
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -239,3 +241,37 @@ daemon.send_signal({int(signal.SIGTERM)})
 print(daemon.wait(), os.listdir("/dev/shm"))
 """
     assert printed(contained(tmp_path, ["-c", program], user=STRANGER)).split("\n") == ["1", "0 []", ""]
+
+
+@pytest.mark.parametrize("root", ["/proc/self", "/proc"])
+def test_a_root_that_takes_no_file_is_named_with_the_cure(pendulum, monkeypatch, root):
+    monkeypatch.setenv("TIGHTLOOP_ROOT", root)
+    with pytest.raises(tl.LaunchError, match=r'folder "/proc.*no file can be made in it; set TIGHTLOOP_ROOT'):
+        tl.launch(pendulum, worlds=1)
+
+
+def test_a_snapshot_for_which_no_file_can_be_opened_says_so(pendulum):
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        lowest = os.dup(0)
+        os.close(lowest)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, hard))
+        try:
+            with pytest.raises(tl.SnapshotError, match=r"Too many open files.*ulimit -n") as refused:
+                sim.snapshot()
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert "df -h" not in str(refused.value)
+        assert sim.snapshot().worlds == 1
+
+
+def test_a_snapshot_for_which_the_daemon_can_open_no_file_says_so(pendulum):
+    with tl.launch(pendulum, worlds=1) as sim:
+        sim.step()
+        used = {int(file.name) for file in Path(f"/proc/{sim.pid}/fd").iterdir()}
+        lowest = next(number for number in itertools.count() if number not in used)
+        resource.prlimit(sim.pid, resource.RLIMIT_NOFILE, (lowest, lowest))
+        with pytest.raises(tl.SnapshotError, match=r"Too many open files.*ulimit -n") as refused:
+            sim.snapshot()
+        assert "df -h" not in str(refused.value)

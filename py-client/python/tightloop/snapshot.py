@@ -6,6 +6,7 @@ A snapshot is a header of 40 bytes, then a record per world; `sim-core/engine/sr
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import struct
 import zlib
@@ -192,6 +193,12 @@ def transfer_file(daemon: int, data: bytes = b"") -> Iterator[str]:
 
 
 def _no_room(reason: object) -> SnapshotError:
+    # what a daemon says is text; there may be too many in the system, too
+    if os.strerror(errno.EMFILE) in str(reason):
+        return SnapshotError(
+            f"snapshot: no file for its way to the daemon: {reason}; allow this process and the daemon more open "
+            "files (`ulimit -n 65536`)"
+        )
     return SnapshotError(f"snapshot: no room on its way to the daemon: {reason}; {system.cure_of_full_exchange()}")
 
 

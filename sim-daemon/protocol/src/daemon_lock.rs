@@ -52,6 +52,13 @@ impl DaemonLock {
             let pid = match paths.presence()? {
                 Presence::Running(beacon) => Some(beacon.pid),
                 Presence::Starting => None,
+                // a folder such as /proc/self is there, and takes no file
+                _ if start.elapsed() > LOOK_MAX && paths.open_lock()?.is_none() => {
+                    return Err(ProtocolError::Root {
+                        path: paths.root().to_owned(),
+                        problem: "no file can be made in it".to_owned(),
+                    });
+                }
                 _ if start.elapsed() > LOOK_MAX => None,
                 _ => {
                     std::thread::sleep(Duration::from_millis(2));
