@@ -80,8 +80,12 @@ def test_blocks_that_do_not_run_say_why():
         "needs mujoco": 1,
         "needs mujoco and onnxruntime": 1,
         "needs onnxruntime": 2,
+        "needs ray[rllib]": 1,
+        "needs rsl-rl-lib": 1,
+        "needs skrl": 1,
         "needs stable-baselines3": 1,
         "needs torch, and minutes": 3,
+        "needs torchrl": 1,
         "needs torchrun": 1,
     }
     assert len(found) - needs.total() >= 40
