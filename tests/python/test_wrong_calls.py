@@ -109,7 +109,7 @@ def test_messages_name_the_call_the_culprit_and_the_cure(world):
             "launch: `worlds` is missing; give it. The call is launch(scene, *, worlds, groups=…",
         ),
         (lambda: tl.launch(worlds=1), "launch: `scene` is missing"),
-        (tl.attach, "attach: `name` is missing; give it. The call is attach(name)"),
+        (tl.attach, "attach: `name` is missing; give it. The call is attach(name, *, timeout=…)"),
         (lambda: tl.Scene(gravitiy=1), "Scene: there is no argument `gravitiy`; did you mean `gravity`?"),
         (
             lambda: tl.Scene(0.001),
