@@ -249,6 +249,10 @@ pub(crate) struct Record {
     /// Replace an existing file, once the recording is whole.
     #[arg(long)]
     pub(crate) force: bool,
+
+    /// End when this parent process ends.
+    #[arg(long, value_name = "PID", hide = true)]
+    pub(crate) parent: Option<u32>,
 }
 
 /// Arguments of `replay` as given; `recording` checks them.

@@ -231,6 +231,11 @@ CALLS: dict[str, Call] = {
     "Sim.view": Call(
         lambda world: world.sim.view, {"port": "port", "worlds": "count", "open": "flag", "hosts": "hosts"}
     ),
+    "Sim.record": Call(
+        lambda world: world.sim.record,
+        {"path": "new file", "fields": "list of names", "force": "flag"},
+        {"path": "/nowhere/run.tlrec"},
+    ),
     "Sim.picture": Call(
         lambda world: world.sim.picture,
         {"worlds": "some worlds", "camera": "camera", "size": "size", "frame": "frame"},
@@ -342,6 +347,7 @@ LEFT = {
     "Link": "Robot.link makes it",
     "RayHits": "Sim.rays makes it",
     "Robot": "Scene.add_urdf makes it",
+    "Recording": "Sim.record makes it",
     "Rollout": "Sim.rollout makes it",
     "Shape": "Scene.add_box makes it",
     "Sim": "launch makes it",

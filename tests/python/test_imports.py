@@ -86,6 +86,7 @@ LAYERS = (
         "tightloop.planning",
         "tightloop.rays",
         "tightloop.realtime",
+        "tightloop.recorder_process",
         "tightloop.rollouts",
         "tightloop.snapshot",
         "tightloop.tangent",

@@ -31,6 +31,7 @@ closed.restore(snapshot)                                  | was closed; launch
 closed.latest()                                           | was closed; launch
 closed.picture()                                          | was closed; launch
 closed.view()                                             | was closed; launch
+closed.record("run.tlrec")                                | was closed; launch
 closed.write(joint_q=0)                                   | was closed; launch
 second.step()                                             | controlled by process .*wait until it releases
 second.reset()                                            | controlled by process .*wait

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import re
 import signal
@@ -293,3 +294,80 @@ def test_what_models_from_mujoco_hold_is_replayed_with_the_same_bits(tmp_path):
                 sim.write(act=rng.normal(size=(3, 1)), eq_active=1.0 - active)
         recorder.finish()
     assert replay(out)[0] == 0
+
+
+def test_a_simulation_records_itself_from_python(pendulum, tmp_path):
+    out, rng = tmp_path / "run.tlrec", np.random.default_rng(5)
+    with tl.launch(pendulum, worlds=3) as sim:
+        sim.step(joint_f=rng.normal(size=(3, 2)))
+        with sim.record(out, fields=["joint_q"]) as recording:
+            assert recording.open and recording.path == out
+            for _ in range(30):
+                sim.step(joint_f=rng.normal(size=(3, 2)))
+        assert not recording.open and "30 frames" in recording.summary and "no gaps" in recording.summary
+        recording.close()
+        sim.step()
+        # the next one begins at the state that the first left
+        again = sim.record(tmp_path / "again.tlrec")
+        sim.step()
+    # the end of the simulation is that of its recordings
+    assert not again.open
+    for file, frames in ((out, 30), (tmp_path / "again.tlrec", 1)):
+        code, said = replay(file)
+        assert code == 0 and f" {frames} frames of 3 worlds are equal, bit for bit" in said, said
+
+
+def test_what_cannot_be_recorded_is_refused_with_the_reason(pendulum, tmp_path):
+    out = tmp_path / "run.tlrec"
+    out.write_text("mine")
+    with tl.launch(pendulum, worlds=2) as sim:
+        with pytest.raises(tl.RecordingError, match=r"is there already.*force=True"):
+            sim.record(out)
+        assert out.read_text() == "mine"
+        with pytest.raises(tl.RecordingError, match="nothing"):
+            sim.record(tmp_path / "other.tlrec", fields=["nothing"])
+        with pytest.raises(tl.RecordingError, match="no-folder"):
+            sim.record(tmp_path / "no-folder" / "run.tlrec")
+        with pytest.raises(tl.ArgumentError, match=r"fields is 'joint_q'; give a list"):
+            sim.record(out, fields="joint_q")
+        with sim.record(out, force=True):
+            sim.step()
+    assert replay(out)[0] == 0
+    with pytest.raises(tl.SimClosed, match="record: the simulation was closed"):
+        sim.record(out, force=True)
+
+
+OWNER = """
+import sys
+import time
+import tightloop as tl
+sim = tl.attach(sys.argv[1])
+recording = sim.record(sys.argv[2])
+sim.step()
+print(recording.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_recording_ends_with_a_killed_owner_and_can_be_replayed(pendulum, tmp_path):
+    out = tmp_path / "run.tlrec"
+    scene = tmp_path / "scene.toml"
+    pendulum.save(scene)
+    with subprocess.Popen(
+        [*COMMAND, "serve", str(scene), f"--name=owned-{os.getpid()}"], stdout=subprocess.PIPE
+    ) as serving:
+        try:
+            assert serving.stdout is not None and serving.stdout.readline()
+            command = [sys.executable, "-c", OWNER, f"owned-{os.getpid()}", str(out)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
+                assert owner.stdout is not None
+                recorder = int(owner.stdout.readline())
+                owner.kill()
+            deadline = time.monotonic() + 10
+            while Path(f"/proc/{recorder}").exists() and time.monotonic() < deadline:
+                time.sleep(0.02)
+            assert not Path(f"/proc/{recorder}").exists()
+        finally:
+            serving.terminate()
+    code, said = replay(out)
+    assert code == 0 and " 1 frames of 1 worlds are equal" in said, said

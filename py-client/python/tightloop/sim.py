@@ -30,6 +30,7 @@ from tightloop.params_advice import ParamsAdvice
 from tightloop.planning import Companion, Plans
 from tightloop.rays import CastsRays
 from tightloop.realtime import HasTiming
+from tightloop.recorder_process import Recording
 from tightloop.sensors import slices_by_name
 from tightloop.signatures import checked_calls
 from tightloop.snapshot import Snapshot, transfer_file
@@ -437,6 +438,29 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         viewer = Viewer(self.name, port=port, worlds=worlds, open=open, hosts=hosts)
         self._companions.append(viewer)
         return viewer
+
+    def record(self, path: str | os.PathLike[str], *, fields: Sequence[str] = (), force: bool = False) -> Recording:
+        """Record every command from now on into a file that ``tightloop replay``, ``view`` and ``film`` read.
+
+        The recorder is a process of its own, as of ``tightloop record``. Use it in a ``with`` block, or call ``close``.
+
+        Args:
+            path: The file, such as ``"run.tlrec"``.
+            fields: Fields to write as whole arrays; a replay that differs then prints both values.
+            force: Whether to overwrite a file that is there.
+
+        Returns:
+            The recording: ``close()`` ends it.
+
+        Raises:
+            SimClosed: The simulation was closed.
+            RecordingError: The file is there already or cannot be written, or frames have no such field.
+        """
+        if not self._end.alive:
+            raise SimClosed("record: the simulation was closed; launch or attach again")
+        recording = Recording(self.name, path, fields=fields, force=force)
+        self._companions.append(recording)
+        return recording
 
     def close(self) -> None:
         """End the simulation: stop a launched daemon (after the last of its groups), or release an attached one.

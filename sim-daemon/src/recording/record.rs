@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use sim_protocol::{
     AttachOptions, Client, Description, Journal, JournalEntry, ProtocolError, keep_waiting,
 };
-use sim_system::signals;
+use sim_system::{process, signals};
 
 use super::blocks::BLOCK_MAX;
 use super::failure::failed;
@@ -231,6 +231,10 @@ impl Recorder<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 self.take_what_waits()?;
                 return Err(End::Done("stopped by a signal".to_owned()));
+            }
+            if self.args.parent.is_some_and(process::is_orphan) {
+                self.take_what_waits()?;
+                return Err(End::Done("its owner ended".to_owned()));
             }
             if self.args.frames == Some(self.tally.frames) {
                 return Err(End::Done("as many frames as asked".to_owned()));

@@ -134,6 +134,7 @@ fn recorded(out: &Path) -> Record {
         frames: None,
         seconds: None,
         force: false,
+        parent: None,
     }
 }
 
