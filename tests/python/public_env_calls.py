@@ -134,6 +134,9 @@ VIEW_CALLS: dict[str, Call] = {
         {},
         {"progress": "a function of the caller's"},
     ),
+    "Picture.anew": Call(
+        lambda world: world.picture.anew, {"width": "count", "height": "count"}, {"width": 64, "height": 48}
+    ),
     "Picture.render": Call(
         lambda world: world.picture.render,
         {"worlds": "some worlds", "camera": "camera", "world": "index", "contacts": "flag"},

@@ -104,7 +104,7 @@ def world(tmp_path_factory) -> Iterator[Any]:
             order=(arm := scene().robots["arm"]).order(arm.dof_names[::-1]),
             dynamics=tl.Dynamics(scene()),
             ik=tl.ik(scene(), tl.Reach("arm/fr3_hand")),
-            picture=SimpleNamespace(render=render),
+            picture=SimpleNamespace(render=render, anew=picture.anew),
             own={"Sim.send": sim.send, "Sim.restore": sim.restore, "Picture.render": picture.render},
             folder=tmp_path_factory.mktemp("films"),
             mesh=sample_meshes.stl(tmp_path_factory.mktemp("meshes") / "box.stl"),
