@@ -79,11 +79,13 @@ def live(
     params: tuple[str, ...] = (),
     substeps: int = 1,
     outputs_at: str = "frame",
+    solved: bool = True,
 ) -> Iterator[Live]:
-    """Run a model, or that of an XML text; both sides solve to the end."""
+    """Run a model, or that of an XML text; both sides solve to the end if ``solved``, or as its options say."""
     model = mujoco.MjModel.from_xml_string(model) if isinstance(model, str) else model
-    model.opt.tolerance = model.opt.ls_tolerance = 0.0
-    model.opt.iterations = model.opt.ls_iterations = 100
+    if solved:
+        model.opt.tolerance = model.opt.ls_tolerance = 0.0
+        model.opt.iterations = model.opt.ls_iterations = 100
     model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
     scene = tl.Scene.from_mujoco(model, name="m")
     fields = ("qpos", "qvel", "qacc", "joint_q", "joint_qd", *(("act",) if model.na else ()), *fields)
