@@ -493,9 +493,11 @@ mod tests {
             let command = command.find_subcommand_mut(name).expect("it is a command");
             let help = command.render_long_help().to_string();
             // where help has spaces at the end of a line, the snapshot has none
-            let lines: Vec<_> = help.lines().map(str::trim_end).collect();
-            let said: Vec<_> = said.lines().collect();
-            assert_eq!(lines, said, "if the change is wanted, change {file}");
+            let lines = help.lines().map(str::trim_end);
+            assert!(
+                lines.eq(said.lines()),
+                "if the change is wanted, change {file}"
+            );
         }
     }
 }

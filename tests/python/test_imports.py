@@ -76,6 +76,7 @@ LAYERS = (
     (
         "tightloop.card",
         "tightloop.command_arrays",
+        "tightloop.companions",
         "tightloop.daemon",
         "tightloop.dynamics",
         "tightloop.ik_objectives",

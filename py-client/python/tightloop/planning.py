@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,13 +15,6 @@ from tightloop.inputs import as_mask
 from tightloop.rollouts import Rollout
 from tightloop.signatures import checked_calls
 from tightloop.snapshot import Snapshot
-
-
-class Companion(Protocol):
-    """What ends with a simulation, such as its viewers."""
-
-    def close(self) -> None:
-        """End it; a second call does nothing."""
 
 
 @checked_calls

@@ -18,6 +18,7 @@ from tightloop._core import Frame
 from tightloop.attributes import Attributes, ByName, nearest
 from tightloop.card import KeepsOnGpu
 from tightloop.command_arrays import Command, ready_arrays, step_arguments
+from tightloop.companions import Companion, end
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
@@ -27,7 +28,7 @@ from tightloop.inverse_kinematics import IkSolver
 from tightloop.notebook import Shown
 from tightloop.params import Params
 from tightloop.params_advice import ParamsAdvice
-from tightloop.planning import Companion, Plans
+from tightloop.planning import Plans
 from tightloop.rays import CastsRays
 from tightloop.realtime import HasTiming
 from tightloop.recorder_process import Recording
@@ -79,7 +80,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         self.name: str = self.info["name"]
         # runs when the last reference is gone, and at interpreter exit
         self._companions: list[Companion] = []
-        self._end = weakref.finalize(self, _end, client, daemon, self.name, os.getpid(), self._companions)
+        self._end = weakref.finalize(self, end, client, daemon, self.name, os.getpid(), self._companions)
         self.pid: int = self.info["pid"]
         self.device: str = self.info["device"]
         self.precision: str = self.info["precision"]
@@ -442,15 +443,12 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     def record(self, path: str | os.PathLike[str], *, fields: Sequence[str] = (), force: bool = False) -> Recording:
         """Record every command from now on into a file that ``tightloop replay``, ``view`` and ``film`` read.
 
-        The recorder is a process of its own, as of ``tightloop record``. Use it in a ``with`` block, or call ``close``.
+        The recorder is a process of its own, as of ``tightloop record``. It ends with a ``with`` block, or by ``close()``.
 
         Args:
             path: The file, such as ``"run.tlrec"``.
             fields: Fields to write as whole arrays; a replay that differs then prints both values.
             force: Whether to overwrite a file that is there.
-
-        Returns:
-            The recording: ``close()`` ends it.
 
         Raises:
             SimClosed: The simulation was closed.
@@ -499,16 +497,3 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     def __repr__(self) -> str:
         state = "" if self._end.alive else ", closed"
         return f"Sim({self.name!r}, worlds={self.worlds}, device={self.device!r}, pid={self.pid}{state})"
-
-
-def _end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, companions: list[Companion]) -> None:
-    # a forked child must not close what belongs to its parent
-    if os.getpid() != owner:
-        return
-    for companion in companions:
-        companion.close()
-    client.close()
-    if daemon is None:
-        _core.sweep(name)  # does nothing while the daemon lives
-    else:
-        daemon.leave()
