@@ -494,10 +494,7 @@ mod tests {
             let help = command.render_long_help().to_string();
             // where help has spaces at the end of a line, the snapshot has none
             let lines = help.lines().map(str::trim_end);
-            assert!(
-                lines.eq(said.lines()),
-                "if the change is wanted, change {file}"
-            );
+            assert!(lines.eq(said.lines()), "wanted? change {file}");
         }
     }
 }
