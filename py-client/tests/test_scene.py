@@ -259,3 +259,10 @@ def test_a_missing_file_is_named(tmp_path):
         tl.Scene.load(tmp_path / "nowhere.toml")
     with pytest.raises(tl.SceneError, match="nowhere"):
         tl.Scene().save(tmp_path / "nowhere" / "scene.toml")
+
+
+def test_a_free_name_is_the_first_that_nobody_has_in_scenes_of_any_size() -> None:
+    scene = tl.Scene()
+    scene.add_box(half_extents=(1, 1, 1), name="box_2")
+    boxes = [scene.add_box(half_extents=(1, 1, 1)).name for _ in range(20_000)]
+    assert boxes[:3] == ["box", "box_3", "box_4"] and boxes[-1] == "box_20001"

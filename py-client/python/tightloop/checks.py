@@ -6,7 +6,7 @@ import math
 import operator
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any, SupportsFloat, SupportsIndex
 
@@ -116,7 +116,7 @@ def quaternion(what: str, values: Vector) -> Quaternion:
     return x / norm, y / norm, z / norm, w / norm
 
 
-def name(what: str, given: str, taken: Sequence[str]) -> str:
+def name(what: str, given: str, taken: Container[str]) -> str:
     """Check a name that is unique in the scene and can precede a slash."""
     if not isinstance(given, str) or not _NAME.fullmatch(given):
         rule = "use letters, digits, `_`, `-` and `.`, of which the last two do not come first"

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,7 @@ HULL_VERTICES = 1024
 def read_model(
     model: Model,
     name: str | None,
-    taken: Sequence[str],
+    taken: Container[str],
     *,
     pos: Vector = ORIGIN,
     quat: Vector = UPRIGHT,

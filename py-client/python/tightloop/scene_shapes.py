@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Container
+from collections import ChainMap
+from collections.abc import Collection, Container
 from typing import TYPE_CHECKING, Any
 
 from tightloop import _core, checks, height_fields
@@ -42,7 +43,7 @@ Collidable = Shape | Robot | Body | Link | str
 class SceneShapes(SceneOptions):
     """Mixin of `Scene` with its shapes."""
 
-    __slots__ = ("bodies", "filters", "models", "robots", "shapes")
+    __slots__ = ("_numbers", "bodies", "filters", "models", "robots", "shapes")
 
     def __init__(self) -> None:
         super().__init__()
@@ -51,6 +52,7 @@ class SceneShapes(SceneOptions):
         self.bodies: dict[str, Body] = ByName("body")
         self.shapes: dict[str, Shape] = ByName("shape")
         self.filters: list[tuple[str, str]] = []
+        self._numbers: dict[str, int] = {}  # of each kind, where free names begin
 
     @with_surface
     def add_box(
@@ -354,16 +356,22 @@ class SceneShapes(SceneOptions):
             )
         return thing
 
-    def _names(self) -> list[str]:
-        return [*self.robots, *self.models, *self.bodies, *self.shapes]
+    def _names(self) -> Collection[str]:
+        return ChainMap(self.robots, self.models, self.bodies, self.shapes)
 
     def _free_name(self, kind: str) -> str:
-        return free_name(kind, self._names())
+        name, self._numbers[kind] = numbered(kind, self._names(), self._numbers.get(kind, 1))
+        return name
 
 
 def free_name(kind: str, taken: Container[str]) -> str:
     """Return the first name of ``kind``, ``kind_2``, … that is not taken."""
-    count = 1
+    return numbered(kind, taken, 1)[0]
+
+
+def numbered(kind: str, taken: Container[str], first: int) -> tuple[str, int]:
+    """Return the first name that is not taken, from a number on, and its number."""
+    count = first
     while (name := kind if count == 1 else f"{kind}_{count}") in taken:
         count += 1
-    return name
+    return name, count
