@@ -443,7 +443,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     def record(self, path: str | os.PathLike[str], *, fields: Sequence[str] = (), force: bool = False) -> Recording:
         """Record every command from now on into a file that ``tightloop replay``, ``view`` and ``film`` read.
 
-        The recorder is a process of its own, as of ``tightloop record``. It ends with a ``with`` block, or by ``close()``.
+        The recorder is a process of its own, as of ``tightloop record``. It ends with a ``with`` block or by `close`.
 
         Args:
             path: The file, such as ``"run.tlrec"``.
