@@ -37,7 +37,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
 from numpy.typing import NDArray
-from places import OUT
+from places import OUT, PLAY
 from training import draw, needed, report
 from training_films import Films
 from training_log import Log, Statistics
@@ -446,7 +446,7 @@ def main() -> None:
             print(f"warning: {warning}", file=sys.stderr)
         if (problem := trainer.films.finish()) is not None:
             print(f"warning: {problem}", file=sys.stderr)
-        print(f"curve: {folder / 'curve.png'}; policy: {policy}; python examples/play.py {args.task} {policy}")
+        print(f"curve: {folder / 'curve.png'}; policy: {policy}; {PLAY} {args.task} {policy}")
     finally:
         trainer.close()
 

@@ -108,6 +108,7 @@ impl Advice {
             return Ok(());
         }
         if let Some((field, columns)) = aimless(description, commands)
+            && !columns.clone().all(|dof| self.followers.has(dof))
             && self.is_new(Told::Targets)
         {
             warn(py, &of_targets(description, field, &columns))?;

@@ -41,6 +41,11 @@ impl Followers {
         Followers(places.collect())
     }
 
+    /// Whether a dof follows another one.
+    pub(crate) fn has(&self, dof: usize) -> bool {
+        self.0.iter().any(|own| own.dofs[0] == dof)
+    }
+
     /// What is wrong with an array of `joint_q` or `joint_target_q`, with the cure.
     pub(crate) fn problem(
         &self,

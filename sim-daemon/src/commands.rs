@@ -8,6 +8,7 @@ use sim_system::signals;
 
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
+use crate::terminal::printable;
 use crate::{bench, devices, inspect, list, recording, session, top};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
@@ -36,7 +37,8 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Err(error) => {
             // a daemon has said it, without waiting for whoever reads it
             if !matches!(&command, CliCommand::Serve(_)) {
-                let _ = writeln!(std::io::stderr(), "tightloop: {error}");
+                let said = printable(&format!("tightloop: {error}")).into_owned();
+                let _ = writeln!(std::io::stderr(), "{said}");
             }
             error.exit_code()
         }

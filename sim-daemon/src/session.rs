@@ -220,14 +220,14 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     make_room_for(count)?;
     sim_protocol::sweep(None)?;
     let daemon_lock = DaemonLock::take(&paths)?;
-    watchdog.keep(&paths);
+    watchdog.keep(&daemon_lock);
     let (daemon, locks) = match count {
         1 => (None, vec![daemon_lock]),
         _ => {
             let taken = (0..count).map(|group| {
                 let paths = paths.group(group)?;
                 let daemon_lock = DaemonLock::take(&paths)?;
-                watchdog.keep(&paths);
+                watchdog.keep(&daemon_lock);
                 Ok::<_, ProtocolError>(daemon_lock)
             });
             (Some(daemon_lock), taken.collect::<Result<Vec<_>, _>>()?)

@@ -9,8 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use sim_protocol::daemon_lock;
-use sim_protocol::paths::DaemonPaths;
+use sim_protocol::daemon_lock::{DaemonLock, Remains};
 use sim_system::{process, signals};
 
 use crate::cli::Serve;
@@ -32,7 +31,7 @@ const LAST_WORDS: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 pub(crate) struct Watchdog {
     stop: Arc<AtomicBool>,
-    places: Arc<Mutex<Vec<DaemonPaths>>>,
+    places: Arc<Mutex<Vec<Remains>>>,
     /// Nothing is sent: the thread sees that it is gone.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -44,7 +43,7 @@ struct Watch {
     /// A signal came; taken back here, so that the next one shows.
     signalled: Arc<AtomicBool>,
     parent: Option<u32>,
-    places: Arc<Mutex<Vec<DaemonPaths>>>,
+    places: Arc<Mutex<Vec<Remains>>>,
     stderr: Printer,
 }
 
@@ -95,9 +94,9 @@ impl Watchdog {
     }
 
     /// From now on, this place is ours, and its files go with us. Whoever asks the first one to stop asks us.
-    pub(crate) fn keep(&self, place: &DaemonPaths) {
+    pub(crate) fn keep(&self, place: &DaemonLock) {
         let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.push(place.clone());
+        places.push(place.remains());
     }
 }
 
@@ -141,7 +140,9 @@ impl Watch {
 
     fn is_asked_by_file(&self) -> bool {
         let places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.first().is_some_and(DaemonPaths::is_asked_to_stop)
+        places
+            .first()
+            .is_some_and(|place| place.paths().is_asked_to_stop())
     }
 
     /// Ends the process, whatever its other threads do.
@@ -151,7 +152,7 @@ impl Watch {
         printer::flush_within(LAST_WORDS, [&self.stderr]);
         // last: another daemon may take the name then
         let places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.iter().rev().for_each(daemon_lock::remove_files);
+        places.iter().rev().for_each(Remains::remove);
         sim_engine::options::leave_at_once(1)
     }
 }

@@ -191,7 +191,7 @@ CALLS: dict[str, Call] = {
             "lock_memory": "flag",
         },
     ),
-    "attach": Call(lambda _: tl.attach, {"name": "label"}),
+    "attach": Call(lambda _: tl.attach, {"name": "label", "timeout": "at least 0 or inf"}, {"name": "nowhere"}),
     "Sim.step": Call(lambda world: world.sim.step, COMMANDS | OF_MODELS | {"body_f": "values"}),
     "Sim.send": Call(
         lambda world: world.send,

@@ -49,7 +49,7 @@ def test_quotes_of_broken_files_reach_no_terminal_as_codes(tmp_path: Path) -> No
     scene, robot = tmp_path / "scene.toml", tmp_path / "robot.urdf"
     scene.write_text(f"dt = {CODES}\n", encoding="utf-8")
     robot.write_text(f'<robot name="r"><link name="{CODES[10:]}"/><joint name="j"/></robot>', encoding="utf-8")
-    for command in ("inspect", "serve", "replay"):
+    for command in ("inspect", "serve", "bench", "replay"):
         for path in (scene, robot):
             text = said(command, path)
             assert text and not has_codes(text), repr(text)
@@ -65,7 +65,7 @@ def test_a_link_whose_name_has_codes_is_listed_without_them(tmp_path: Path) -> N
 
 
 def test_errors_and_warnings_show_codes() -> None:
-    for kind in (tl.SceneError, tl.DaemonLost, tl.CommandRefused):
+    for kind in (tl.SceneError, tl.DaemonLost, tl.CommandRefused, tl.UnknownName):
         assert str(kind(f"a{CODES}\tb\nc")) == "a\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\tb\nc"
     with pytest.warns(tl.TightloopWarning, match=r"a\\u001b\[2J") as caught:
         advice.warn("a\x1b[2J")

@@ -31,7 +31,8 @@ _FAST = 20.0
 #: Causes that this process has reported, and how many it remembers.
 _TOLD: set[str] = set()
 _TOLD_MAX = 4096
-_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
+# digits of names are none: joint1 and joint2 are two causes
+_NUMBER = re.compile(r"(?<![\w`/.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w/`])|\bnan\b|\binf\b")
 
 
 def warn(message: str, *, cause: str | None = None) -> None:

@@ -47,6 +47,10 @@ def keep(kind: str, name: str, write: Callable[[Path], object]) -> Path:
             with whole_file(path) as part:
                 write(part)
             _trim(folder, LIMITS[kind], path)
+        except OSError:
+            # one that can only be read serves as well
+            if not path.is_file():
+                raise
     except OSError as error:
         raise SceneError(f"{path}: cannot be kept there: {error}; set XDG_CACHE_HOME to a folder") from error
     return path

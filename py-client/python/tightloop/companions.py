@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from contextlib import ExitStack
 from typing import Protocol
 
 from tightloop import _core
@@ -30,10 +31,12 @@ def end(client: _core.Client, daemon: Daemon | None, name: str, owner: int, comp
     # a forked child must not close what belongs to its parent
     if os.getpid() != owner:
         return
-    for companion in companions:
-        companion.close()
-    client.close()
-    if daemon is None:
-        _core.sweep(name)  # does nothing while the daemon lives
-    else:
-        daemon.leave()
+    # the last one in is the first one out, and each runs whatever another one raises
+    with ExitStack() as rest:
+        if daemon is None:
+            rest.callback(_core.sweep, name)  # does nothing while the daemon lives
+        else:
+            rest.callback(daemon.leave)
+        rest.callback(client.close)
+        for companion in reversed([*companions]):
+            rest.callback(companion.close)

@@ -18,7 +18,7 @@ class TightloopError(Exception):
 
 
 class TightloopWarning(UserWarning):
-    """What is valid and most likely a mistake; the message names it and the cure. A simulation tells each one once.
+    """What is valid and most likely a mistake; the message names it and the cure. A process reports each one once.
 
     ``warnings.simplefilter("error", tl.TightloopWarning)`` makes errors of them, ``"ignore"`` hides them.
     """
@@ -119,7 +119,7 @@ class UnknownName(TightloopError, KeyError):
     """A scene or a simulation has nothing of that name; the message suggests another."""
 
     def __str__(self) -> str:  # KeyError's has quotes around it
-        return str(self.args[0])
+        return printable(str(self.args[0]))
 
 
 class UnknownField(TightloopError, AttributeError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +58,7 @@ def checked(what: str, path: Path) -> Path:
     try:
         with named_files.opened("a file that numpy.save wrote", path, SceneError, limit=_FILE_MAX) as file:
             array = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, MemoryError, BadZipFile) as error:
         raise SceneError(f"{what}: {path}: {error}; give a file that numpy.save wrote") from None
     if not isinstance(array, np.ndarray):
         raise SceneError(f"{what}: {path} has several arrays; give a file that numpy.save wrote")

@@ -376,7 +376,7 @@ def _planner(sim: Sim, fields: Sequence[str], samples: int) -> Sim:
             sim._companions.remove(kept)
             sim._companions.append(kept)
             return kept
-    for oldest in planners[: len(planners) + 1 - _PLANNERS]:
+    for oldest in planners[: max(0, len(planners) + 1 - _PLANNERS)]:
         sim._companions.remove(oldest)
         oldest.close()
     scene = Scene.from_toml(sim.info["scene"], sim.info["scene_folder"])

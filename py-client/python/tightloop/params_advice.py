@@ -100,7 +100,9 @@ class ParamsAdvice:
             return
         self._compared[name] = self._compared.get(name, 0) + 1
         old = before(name)[rows]
-        changed = near & (given.astype(np.float32) != old.astype(np.float32)) & (old != 0.0)
+        # 1e30 is no limit, which nobody scales
+        is_scaled = (old != 0.0) & (np.abs(old) < 0.99e30)
+        changed = near & (given.astype(np.float32) != old.astype(np.float32)) & is_scaled
         if changed.sum() < _DRAWS_MIN or (changed != (given.astype(np.float32) != old.astype(np.float32))).any():
             return
         drawn, own = given[changed], old[changed]

@@ -44,7 +44,13 @@ class Recording:
             raise RecordingError(f"record: the recorder cannot be started: {problem.strerror}") from problem
         assert process.stderr is not None
         # it says that it has begun, once the state of all worlds is there; or why it cannot
-        line = process.stderr.readline().decode(errors="replace").strip().removeprefix("tightloop: ")
+        try:
+            line = process.stderr.readline().decode(errors="replace").strip().removeprefix("tightloop: ")
+        except BaseException:
+            # an interrupt: nobody could end it
+            process.kill()
+            process.communicate()
+            raise
         if not line.startswith("recording "):
             process.communicate()
             raise RecordingError(f"record: {line or 'the recorder ended'}".replace("--force", "force=True"))

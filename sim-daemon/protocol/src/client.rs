@@ -83,11 +83,10 @@ impl Client {
     fn handshake(peer: Peer, hook: Hook<'_>) -> Result<Client, ProtocolError> {
         let name = peer.paths.name().to_owned();
         let (connection, announced) = Connection::open(&peer, hook)?;
-        // a daemon at long work answers later, and has written its description before
         match connection.ask_within(DESCRIBED_MAX, &Request::Describe, hook) {
+            // a daemon at long work answers later, and has written its description before
             Ok(Response::Described) | Err(ProtocolError::Timeout { .. }) => {}
-            Ok(_) => return Err(malformed("the answer to describe")),
-            Err(error) => return Err(error),
+            other => return Err(other.err().unwrap_or(malformed("the answer to describe"))),
         }
         let description = described::read(&connection.peer.paths, connection.peer.beacon.session)?;
         for (fact, announced, described) in [
@@ -392,8 +391,8 @@ impl Client {
     /// `watch_worlds` worlds and is published at a limited rate.
     ///
     /// # Errors
-    /// [`ProtocolError::FramesHeld`], [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::CallInProgress`],
-    /// [`ProtocolError::Interrupted`] while it waits for the call of another thread.
+    /// [`ProtocolError::FramesHeld`], [`ProtocolError::TooManyClients`], [`ProtocolError::DaemonLost`] and its kin,
+    /// [`ProtocolError::CallInProgress`], [`ProtocolError::Interrupted`] while it waits for the call of another thread.
     pub fn latest(&self, hook: Hook<'_>) -> Result<Option<Frame>, ProtocolError> {
         self.with_observer(hook, |observer, _| observer.latest())
     }
@@ -415,10 +414,11 @@ impl Client {
     /// # Errors
     /// As [`Client::latest`].
     pub fn observers(&self, hook: Hook<'_>) -> Result<usize, ProtocolError> {
-        let all = self.with_observer(hook, |_, hook| {
-            self.connection.ports(hook, transport::watchers)
-        })?;
-        Ok(all.saturating_sub(1))
+        self.check_process()?;
+        // whoever only counts takes no seat
+        let own = usize::from(self.observer.take(hook)?.is_some());
+        let all = self.connection.ports(hook, transport::watchers)?;
+        Ok(all.saturating_sub(own))
     }
 
     fn with_observer<T>(

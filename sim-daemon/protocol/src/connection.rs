@@ -178,14 +178,18 @@ impl Connection {
     pub(crate) fn shut_down(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         let start = Instant::now();
         let (peer, daemon) = (&self.peer, self.peer.paths.daemon()?);
-        // who waits hears the request, who is busy the file
-        let ends = stop::asked(&daemon)?;
-        self.post(&Request::Shutdown);
-        self.notify();
         let runs = |paths: &DaemonPaths| match paths.presence() {
             Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
             _ => false,
         };
+        // another run may have the name by now, which the file would end
+        if peer.check().is_err() && !runs(&daemon) {
+            return Ok(());
+        }
+        // who waits hears the request, who is busy the file
+        let ends = stop::asked(&daemon)?;
+        self.post(&Request::Shutdown);
+        self.notify();
         while peer.check().is_ok() || runs(&daemon) {
             if start.elapsed() > ANSWER_MAX {
                 return Err(peer.timeout(ANSWER_MAX));

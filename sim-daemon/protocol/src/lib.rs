@@ -75,7 +75,7 @@ mod waiter;
 
 pub use client::Client;
 pub use command::{Command, OnDevice, Values};
-pub use daemon_lock::{cleanup_after_death, remove_files, sweep};
+pub use daemon_lock::{cleanup_after_death, sweep};
 pub use description::{
     Description, FieldInfo, Follower, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
 };

@@ -236,6 +236,16 @@ impl DaemonPaths {
         }
     }
 
+    /// Whether a file can be made under the root.
+    pub(crate) fn takes_files(&self) -> bool {
+        let path = self
+            .root
+            .join(format!("{}.{}", self.name, std::process::id()));
+        let is_made = private().create(true).truncate(false).open(&path).is_ok();
+        let _ = fs::remove_file(&path);
+        is_made
+    }
+
     fn lock_error(&self, error: &std::io::Error) -> ProtocolError {
         ProtocolError::root(&self.lock_path(), error)
     }

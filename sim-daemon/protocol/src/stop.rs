@@ -38,7 +38,8 @@ pub(crate) fn asked(paths: &DaemonPaths) -> Result<Asked<'_>, ProtocolError> {
 /// Those of [`find`] when there is none; [`ProtocolError::Silent`] when it does not end; [`ProtocolError::Interrupted`].
 pub fn stop(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<(), ProtocolError> {
     let paths = DaemonPaths::new(options.root.as_deref(), name)?.daemon()?;
-    if !matches!(paths.presence()?, Presence::Starting | Presence::Running(_)) {
+    // one that starts has no version yet
+    if !matches!(paths.presence()?, Presence::Starting) {
         find(name, options, &mut *hook)?;
     }
     let _asked = asked(&paths)?;

@@ -42,6 +42,8 @@ fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
         return None;
     }
     let names: Vec<String> = moving(robot)
+        // a follower has the target of its leader, and the constraint moves it
+        .filter(|joint| joint.mimic.is_none())
         .filter(|joint| matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic))
         .filter(|joint| {
             joint.dofs.iter().zip(&joint.q).any(|(dof, start)| {

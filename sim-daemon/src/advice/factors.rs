@@ -15,6 +15,8 @@ const BESIDE: f64 = 1.25;
 const FAR: f64 = 10.0;
 /// How far the middle of a range of frictions may be from 1: they are near 1 themselves [–].
 const CENTRE: f64 = 0.05;
+/// The same of other parameters, whose own values are rarely about 1.
+const ABOUT: f64 = 0.15;
 
 /// Advice on draws that look like factors, a sentence or two for each parameter and range.
 pub(super) fn advice(scene: &Description, model: &Model) -> Vec<String> {
@@ -73,7 +75,12 @@ fn is_factor(param: Param, distribution: &Distribution, own: &[f64]) -> bool {
     let is_beside = |value: &f64| *value < low / BESIDE || *value > high * BESIDE;
     let is_near_1 = match param {
         Param::ShapeMu => (0.5 * (low + high) - 1.0).abs() <= CENTRE,
-        _ => low <= 1.0 && high >= 1.0,
+        // factors are about 1, by difference or by ratio
+        _ => {
+            let middles = [0.5 * (low + high), (low * high).sqrt()];
+            let is_about_1 = middles.iter().any(|middle| (middle - 1.0).abs() <= ABOUT);
+            low <= 1.0 && high >= 1.0 && is_about_1
+        }
     };
     if is_near_1 {
         return own.iter().any(is_beside);

@@ -175,9 +175,12 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
         return Ok((part.file().map_err(not_made)?, Some(part)));
     }
     let mut options = OpenOptions::new();
-    // a device or a pipe is written to
-    let is_there = args.force && out.exists();
-    options.write(true).create_new(!is_there);
+    options.write(true);
+    match args.force {
+        // a device or a pipe is written to, and so is what a link names that is not there yet
+        true => options.create(true).truncate(true),
+        false => options.create_new(true),
+    };
     let file = output::open(out, &mut options).map_err(not_made)?;
     Ok((file, None))
 }

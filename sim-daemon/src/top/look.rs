@@ -87,13 +87,15 @@ impl Watched {
         let mut after = Vec::new();
         for (group, seen) in self.groups.iter().zip(&mut self.seen) {
             controllers.extend(group.controller(hook)?);
-            // this one observes too, and does not count itself
             observers += group.observers(hook)?;
             let told = group.timing(false, hook)?;
             after.push((told.frames, Instant::now()));
             timing.push(told);
-            if let Some(frame) = group.latest(hook)? {
-                *seen = Seen::of(&frame);
+            match group.latest(hook) {
+                Ok(Some(frame)) => *seen = Seen::of(&frame),
+                // where all seats are taken, the rest is known without one
+                Ok(None) | Err(ProtocolError::TooManyClients { .. }) => {}
+                Err(error) => return Err(error),
             }
         }
         let pairs = after.iter().zip(&self.before);

@@ -60,7 +60,15 @@ _LOADS = ("LOAD_ATTR", "LOAD_METHOD", "LOAD_SUPER_ATTR")
 
 def tell_of_class(task: type, base: type) -> None:
     """Warn of members of a class that look like those of a `Task` and that nothing uses."""
-    _tell(task, base, {name: _plain(value) for name, value in vars(task).items()})
+
+    def is_abstract(own: Any) -> bool:
+        return getattr(own, "scene", None) is vars(base)["scene"]
+
+    # the members of a class without a scene are for its subclasses, and looked at with them
+    if is_abstract(task):
+        return
+    own = [one for one in task.__mro__ if one not in base.__mro__ and (one is task or is_abstract(one))]
+    _tell(task, base, {name: _plain(value) for one in reversed(own) for name, value in vars(one).items()})
 
 
 def tell_of_attributes(task: Any, base: type) -> None:
