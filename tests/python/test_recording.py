@@ -309,6 +309,7 @@ def test_a_simulation_records_itself_from_python(pendulum, tmp_path):
         sim.step()
         # the next one begins at the state that the first left
         again = sim.record(tmp_path / "again.tlrec")
+        assert sim._companions == [again] and recording.closed
         sim.step()
     # the end of the simulation is that of its recordings
     assert not again.open

@@ -63,6 +63,11 @@ class Recording:
         """Whether it records."""
         return self._end.alive and self._process.poll() is None
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called, by itself or by what it ends with."""
+        return not self._end.alive
+
     def close(self) -> None:
         """End the recording; the file then has every command that was sent before. A second call does nothing.
 

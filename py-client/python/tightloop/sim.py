@@ -457,7 +457,8 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         if not self._end.alive:
             raise SimClosed("record: the simulation was closed; launch or attach again")
         recording = Recording(self.name, path, fields=fields, force=force)
-        self._companions.append(recording)
+        ended = [one for one in self._companions if isinstance(one, Recording) and one.closed]
+        self._companions[:] = [one for one in self._companions if one not in ended] + [recording]
         return recording
 
     def close(self) -> None:

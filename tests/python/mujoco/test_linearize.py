@@ -241,6 +241,16 @@ def test_planners_are_about_as_large_as_calls_need_and_few(pendulum):
         assert len(sim._companions) == 3
 
 
+def test_calls_of_four_sizes_keep_four_planners(pendulum):
+    with tl.launch(pendulum, worlds=100, precision="f64") as sim:
+        for count in (1, 5, 25, 79):
+            tl.linearize(sim, range(count))
+        planners = [*sim._companions]
+        assert len(planners) == 4
+        tl.linearize(sim, 0)
+        assert {*map(id, sim._companions)} == {*map(id, planners)}
+
+
 def test_a_frame_of_several_substeps_is_linearized_as_one(pendulum):
     with tl.launch(pendulum, worlds=1, precision="f64") as sim:
         frame = tl.linearize(sim, 0)
