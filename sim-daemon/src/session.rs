@@ -77,9 +77,10 @@ fn run_with(
         streams,
     });
     let result = groups::serve_all(groups, stop, |number, group: Group| {
-        let log = match group.announced.groups {
-            1 => log.clone(),
-            _ => log.for_group(number),
+        let is_alone = group.announced.groups == 1;
+        let log = match is_alone {
+            true => log.clone(),
+            false => log.for_group(number),
         };
         let mut host = Host::open(
             group.daemon_lock,
@@ -94,6 +95,10 @@ fn run_with(
             .unwrap_or_else(PoisonError::into_inner)
             .open(&host)?;
         let result = server::run(group.simulation, &mut host, &log);
+        // now: we may be ended while another group is at long work
+        if let (Err(error), false) = (&result, is_alone) {
+            log.write(&format!("failed: {error}"));
+        }
         // its cleanup must not read the shared folder while the host removes it
         drop(janitor);
         result
