@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::terminal::printable;
 
+use sim_system::files;
+
 pub(crate) use sim_system::files::open_to_write as open;
 
 /// Writes a file beside its place and renames it, so that a full disk leaves what was there before.
@@ -40,8 +42,46 @@ impl Part {
     pub(crate) fn new(place: &Path) -> io::Result<Part> {
         let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
         let path = beside(&target);
+        let file = File::create_new(&path)?;
+        Part::of(file, path, target)
+    }
+
+    /// The same under a name that a user knows, such as `run.part.tlrec`: if the process is killed, it stays, and the next one
+    /// takes its place.
+    ///
+    /// # Errors
+    /// `ResourceBusy` where another process writes it; what the system says.
+    pub(crate) fn named(place: &Path) -> io::Result<Part> {
+        let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
+        let mut name = target.file_stem().unwrap_or_default().to_owned();
+        name.push(".part");
+        if let Some(ending) = target.extension() {
+            name.push(".");
+            name.push(ending);
+        }
+        let path = target.with_file_name(name);
+        loop {
+            match File::create_new(&path) {
+                // who removes it in between has taken it for that of a killed process
+                Ok(file) if files::try_lock(&file)? && files::is_at(&file, &path)? => {
+                    return Part::of(file, path, target);
+                }
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                    let there = fs::symlink_metadata(&path)?;
+                    if !there.is_file() || !files::try_lock(&File::open(&path)?)? {
+                        return Err(ErrorKind::ResourceBusy.into());
+                    }
+                    fs::remove_file(&path)?;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn of(file: File, path: PathBuf, target: PathBuf) -> io::Result<Part> {
         let part = Part {
-            file: File::create_new(&path)?,
+            file,
             path,
             target,
             kept: false,

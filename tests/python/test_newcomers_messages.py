@@ -174,7 +174,7 @@ tl.Scene.from_mujoco("<mujoco/>")                         | is XML text; give .*
 mine.save(folder)                                         | cannot be written: .*name a file
 mine.save(folder / "no" / "scene.toml")                   | cannot be written: .*a folder that you may write to
 snapshot.save(folder / "no" / "x")                        | cannot be written
-tl.Snapshot.load(folder)                                  | cannot be read: .*give a file
+tl.Snapshot.load(folder)                                  | it is not a file; give the path of a snapshot
 tl.Snapshot.load(folder / "hello.txt")                    | no snapshot; give
 view.Film(folder / "x.avi", sim)                          | 'x\.avi'; it ends in \.png
 view.Film(folder / "x.gif", "sim")                        | film: sim is 'sim'; give a Sim

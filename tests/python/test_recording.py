@@ -145,8 +145,10 @@ def test_ctrl_c_ends_a_recording_and_another_may_take_its_place_when_forced(pend
         assert "7 frames" in replay(out)[1]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a limit on the size of files stands for a full disk")
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit on the size of files stands for a full disk")
 def test_a_forced_recording_that_is_not_whole_leaves_the_old_one(pendulum, tmp_path):
+    import resource
+
     out, link = tmp_path / "run.tlrec", tmp_path / "link.tlrec"
     link.symlink_to(out)
 
@@ -161,18 +163,24 @@ def test_a_forced_recording_that_is_not_whole_leaves_the_old_one(pendulum, tmp_p
         recorder.process.kill()
         recorder.process.communicate()
         assert out.read_bytes() == old
-        # files of at most 16 blocks; a write beyond is an error, as on a full disk
-        limited = ["sh", "-c", "trap '' XFSZ; ulimit -f 16; exec \"$@\"", "sh", *COMMAND]
+        # what the killed one wrote is there, and readable
+        assert {file.name for file in tmp_path.iterdir()} == {"run.tlrec", "link.tlrec", "run.part.tlrec"}
+        limited = ["sh", "-c", "trap '' XFSZ; exec \"$@\"", "sh", *COMMAND]
         command = [*limited, "record", sim.name, str(link), "--force"]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as full:
+            assert full.stderr is not None and "recording" in full.stderr.readline()
+            busy = subprocess.run(
+                [*COMMAND, "record", sim.name, str(out), "--force"], capture_output=True, text=True, check=False
+            )
+            assert busy.returncode == 1 and "another recorder replaces it" in busy.stderr, busy.stderr
+            # files of at most 16 kB; a write beyond is an error, as on a full disk
+            resource.prlimit(full.pid, resource.RLIMIT_FSIZE, (1 << 14, 1 << 14))
             while full.poll() is None:
                 sim.step(joint_f=np.random.default_rng(1).normal(size=(WORLDS, 2)))
-            assert full.stderr is not None
             said = full.stderr.read()
         assert full.returncode == 1 and "the old recording stays; make room" in said, said
         assert out.read_bytes() == old
-        # what was killed left a hidden file, and nothing else did
-        assert len([*tmp_path.iterdir()]) == 3
+        assert {file.name for file in tmp_path.iterdir()} == {"run.tlrec", "link.tlrec"}
         recorder = Recorder(sim, link, "--force", "--frames", "7")
         for _ in range(7):
             sim.step()

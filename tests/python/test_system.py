@@ -31,8 +31,8 @@ DIFFERS = PACKAGE / "system.py"
 
 #: What the package uses of modules whose contents differ between systems. All of it is on each of them.
 EVERYWHERE = {
-    "os": """O_CREAT O_EXCL O_WRONLY PathLike W_OK _exit access close cpu_count environ fspath fstat getpid open sep
-        strerror""",
+    "os": """O_CREAT O_EXCL O_RDONLY O_WRONLY PathLike W_OK _exit access close cpu_count environ fdopen fspath fstat
+        getpid open scandir sep strerror utime""",
     "signal": "SIGINT SIG_DFL signal",
     "socket": "SOCK_STREAM getaddrinfo gethostname socket",
     "subprocess": "PIPE Popen TimeoutExpired",
@@ -225,7 +225,7 @@ def test_a_process_apart_is_a_session_or_a_group_of_its_own(monkeypatch: pytest.
     monkeypatch.setattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0x200, raising=False)
     with on("win32"):
         system.start_apart(["program"], stdin=subprocess.DEVNULL)
-    assert given == {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "creationflags": 0x200}
+    assert given == {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": None, "creationflags": 0x200}
 
 
 class Process:
@@ -322,7 +322,7 @@ def test_a_file_is_flushed_by_what_each_system_flushes(tmp_path: Path, monkeypat
 @pytest.mark.parametrize("platform", ["linux", "darwin"])
 def test_a_pipe_without_a_writer_is_refused_at_once(platform: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with on(platform), pytest.raises(tl.SnapshotError, match="is no file"):
+    with on(platform), pytest.raises(tl.SnapshotError, match="it is not a file"):
         tl.Snapshot.load(tmp_path / "pipe")
 
 

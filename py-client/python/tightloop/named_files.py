@@ -12,6 +12,8 @@ import stat
 from pathlib import Path
 from typing import IO
 
+from tightloop import system
+
 _GIB, _MIB = 1 << 30, 1 << 20
 # Windows has neither pipes nor terminals with the name of a file, and marks binary files
 _FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY", "O_BINARY"))
@@ -40,7 +42,7 @@ def opened(what: str, path: Path, error: type[Exception], *, limit: int) -> IO[b
         raise error(none) from None
     try:
         status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode) or status.st_dev == _device_of_processes():
+        if not stat.S_ISREG(status.st_mode) or status.st_dev == system.device_of_processes():
             raise error(none)
         if status.st_size > limit:
             most = f"{limit // _GIB} GiB" if limit >= _GIB else f"{limit // _MIB} MiB"
@@ -59,10 +61,3 @@ def check(what: str, path: Path, error: type[Exception], *, limit: int) -> None:
         error: It is not a file, or is too large.
     """
     opened(what, path, error, limit=limit).close()
-
-
-def _device_of_processes() -> int | None:
-    try:
-        return Path("/proc").stat().st_dev if Path("/proc/self").exists() else None
-    except OSError:
-        return None

@@ -76,6 +76,14 @@ def start_apart(
     return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=stderr, start_new_session=True)
 
 
+def device_of_processes() -> int | None:
+    """Return the device of files that show processes and the kernel, which are no files to read; None without them."""
+    try:
+        return Path("/proc").stat().st_dev if Path("/proc/self").exists() else None
+    except OSError:
+        return None
+
+
 def ask_to_end(process: subprocess.Popen[bytes]) -> None:
     """Ask a process of `start_apart` to end."""
     if sys.platform == "win32":

@@ -165,13 +165,14 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
     let out = &args.out;
     let not_made = |error: io::Error| match error.kind() {
         ErrorKind::AlreadyExists => is_there(out),
+        ErrorKind::ResourceBusy => failed(out, "another recorder replaces it; end that one first"),
         ErrorKind::NotFound => failed(out, "its folder is not there; make it first"),
         _ => failed(out, format!("cannot be made: {error}")),
     };
     if args.force && out.is_file() {
         // whoever may not write it may not replace it either
         output::open(out, OpenOptions::new().write(true)).map_err(not_made)?;
-        let part = Part::new(out).map_err(not_made)?;
+        let part = Part::named(out).map_err(not_made)?;
         return Ok((part.file().map_err(not_made)?, Some(part)));
     }
     let mut options = OpenOptions::new();
