@@ -67,7 +67,7 @@ def compare(model: mujoco.MjModel, qpos: Array) -> set[int]:
             for world, own in enumerate(points)
             if apart(frame.contact_pos[world, : frame.contact_count[world]], own)
         ]
-        # ties, which MuJoCo decides otherwise where the pose moves by some roundings: 1.8 % of an icosahedron's, on its edges
+        # ties, which MuJoCo decides otherwise where the pose moves by roundings: 1.8 % of an icosahedron's, on edges
         assert len(others) <= 0.02 * len(qpos)
         for world in others:
             near = qpos[world] + np.random.default_rng(10).normal(size=(64, 7)) * 1e-15
