@@ -426,8 +426,6 @@ def main() -> None:
     try:
         trainer = Trainer(args.task, args.seed, config, folder, daemon=args.daemon, device=args.device, made=made)
     except TightloopError as problem:
-        if args.model is None:
-            raise
         raise SystemExit(str(problem)) from None
     try:
         if args.resume and (folder / "checkpoint.pt").exists():

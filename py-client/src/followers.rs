@@ -4,9 +4,9 @@ use sim_protocol::{Command, Description};
 
 use crate::rows::{number, worlds};
 
-/// Distance of a target from the leader's that is told [rad or m].
+/// Distance of a target from the leader's that is reported [rad or m].
 const TARGET: f64 = 1e-3;
-/// Distance of a written position that is told [rad or m]: under load, a joint leaves its leader by less.
+/// Distance of a written position that is reported [rad or m]: under load, a joint leaves its leader by less.
 const POSITION: f64 = 0.02;
 
 /// A mimic joint, by its places among dofs and coordinates.

@@ -45,8 +45,8 @@ pub(crate) fn interruptible<T: Send>(
     })
 }
 
-/// The same for work that cannot be asked to stop, such as compiling a scene: when a handler raises, nobody waits for it any
-/// more.
+/// The same for work that cannot be asked to stop, such as compiling a scene: when a handler raises, it goes on
+/// without being waited for.
 pub(crate) fn abandonable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,

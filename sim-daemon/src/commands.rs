@@ -37,8 +37,8 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         Err(error) => {
             // a daemon has said it, without waiting for whoever reads it
             if !matches!(&command, CliCommand::Serve(_)) {
-                let said = printable(&format!("tightloop: {error}")).into_owned();
-                let _ = writeln!(std::io::stderr(), "{said}");
+                let said = format!("tightloop: {error}");
+                let _ = writeln!(std::io::stderr(), "{}", printable(&said));
             }
             error.exit_code()
         }

@@ -1,8 +1,8 @@
 //! A thread beside the loop of a group: it cleans up after dead clients, also while a step takes long.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use sim_protocol::host::ClientCleanup;
 
@@ -14,28 +14,18 @@ const CLEAN_PERIOD: Duration = Duration::from_millis(100);
 /// The running thread; dropping it ends it.
 #[derive(Debug)]
 pub(crate) struct Janitor {
-    end: Arc<(Mutex<bool>, Condvar)>,
+    /// Nothing is sent: the thread sees that it is gone.
+    end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Janitor {
     /// Starts cleaning.
     pub(crate) fn start(mut cleanup: ClientCleanup) -> Result<Janitor, DaemonError> {
-        let end = Arc::new((Mutex::new(false), Condvar::new()));
-        let theirs = Arc::clone(&end);
+        let (end, ended) = channel();
         let watch = move || {
-            let (ended, signal) = &*theirs;
-            let mut cleaned = Instant::now();
-            let mut guard = ended.lock().unwrap_or_else(PoisonError::into_inner);
-            while !*guard {
-                if cleaned.elapsed() >= CLEAN_PERIOD {
-                    cleanup.clean();
-                    cleaned = Instant::now();
-                }
-                guard = signal
-                    .wait_timeout(guard, CLEAN_PERIOD)
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .0;
+            while ended.recv_timeout(CLEAN_PERIOD) == Err(RecvTimeoutError::Timeout) {
+                cleanup.clean();
             }
         };
         let thread = std::thread::Builder::new()
@@ -46,7 +36,7 @@ impl Janitor {
                 problem: error.to_string(),
             })?;
         Ok(Janitor {
-            end,
+            end: Some(end),
             thread: Some(thread),
         })
     }
@@ -54,8 +44,7 @@ impl Janitor {
 
 impl Drop for Janitor {
     fn drop(&mut self) {
-        *self.end.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.end.1.notify_all();
+        self.end.take();
         if let Some(thread) = self.thread.take() {
             // a panic there has been printed on stderr already
             let _ = thread.join();

@@ -20,7 +20,7 @@ _FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NO
 
 
 def opened(what: str, path: Path, error: type[Exception], *, limit: int) -> IO[bytes]:
-    """Open a file, to be closed by a ``with`` statement; nobody is waited for.
+    """Open a file, to be closed by a ``with`` statement, without waiting.
 
     Args:
         what: What it is to be, for messages, such as "a snapshot".

@@ -100,7 +100,7 @@ class ParamsAdvice:
             return
         self._compared[name] = self._compared.get(name, 0) + 1
         old = before(name)[rows]
-        # 1e30 is no limit, which nobody scales
+        # 1e30 stands for no limit, which has no factor
         is_scaled = (old != 0.0) & (np.abs(old) < 0.99e30)
         changed = near & (given.astype(np.float32) != old.astype(np.float32)) & is_scaled
         if changed.sum() < _DRAWS_MIN or (changed != (given.astype(np.float32) != old.astype(np.float32))).any():

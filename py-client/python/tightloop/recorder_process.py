@@ -47,7 +47,7 @@ class Recording:
         try:
             line = process.stderr.readline().decode(errors="replace").strip().removeprefix("tightloop: ")
         except BaseException:
-            # an interrupt: nobody could end it
+            # an interrupt: it would have no owner
             process.kill()
             process.communicate()
             raise

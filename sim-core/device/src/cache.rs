@@ -63,7 +63,6 @@ impl Cache {
     pub fn keep_module(&self, source: &Source, module: &Module) {
         let key = key(source);
         store(&self.file(&key), &print(module, &key));
-        bound(&self.folder, "program-", BYTES_MAX);
     }
 
     /// The driver's pipeline cache of an earlier run; empty if there is none.
@@ -78,7 +77,13 @@ impl Cache {
     pub fn keep_pipelines(&self, body: &[u8]) {
         if self.kept.swap(fnv(body), Ordering::Relaxed) != fnv(body) {
             store(&self.driver, body);
-            bound(&self.folder, "driver-", BYTES_MAX);
+        }
+    }
+
+    /// Removes the files used longest ago, where there are too many: once for all programs of a model.
+    pub fn keep_within_bounds(&self) {
+        for prefix in ["program-", "driver-"] {
+            bound(&self.folder, prefix, BYTES_MAX);
         }
     }
 

@@ -43,6 +43,7 @@ impl Device {
         first_runs?;
         if let (Some(vulkan), Some(cache)) = (&self.inner.vulkan, &self.inner.cache) {
             cache.keep_pipelines(&vulkan.remembered());
+            cache.keep_within_bounds();
         }
         Ok(made)
     }

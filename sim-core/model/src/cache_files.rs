@@ -55,7 +55,7 @@ pub(crate) fn store(path: &Path, body: &[u8], most: u64) {
 /// Removes files of a folder, those first that were used longest ago, until they have at most this many bytes together.
 ///
 /// A file counts as used when it was last written or marked as modified. Files of killed writers go like all others.
-pub fn keep_within(folder: &Path, most: u64) {
+fn keep_within(folder: &Path, most: u64) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;
     };

@@ -19,7 +19,7 @@
 //! | `hull_fans`, `hull_tables`, `model` | the kernel source's tables of hulls; the result |
 //! | `compile` | from a description to a model |
 
-pub mod cache_files;
+mod cache_files;
 mod compile;
 mod description;
 mod distribution;

@@ -4,7 +4,7 @@ use sim_model::{Description, Joint, JointKind, Mimic, Robot};
 
 use super::some;
 
-/// Distance from the leader's place that is told [rad or m]: a state that ran has less.
+/// Distance from the leader's place that is reported [rad or m]: a state that ran has less.
 const AWAY: f64 = 1e-3;
 
 /// Advice on followers of robots from URDF.

@@ -56,8 +56,8 @@ def poses(rng: Generator, model: mujoco.MjModel, count: int) -> Array:
     return np.hstack([at @ plane.T + model.geom_pos[0], quats])
 
 
-def compare(model: mujoco.MjModel, qpos: Array) -> set[int]:
-    """Assert that every world has MuJoCo's points; how many they have."""
+def compare(model: mujoco.MjModel, qpos: Array, *, ties: float = 0.0) -> set[int]:
+    """Assert that every world has MuJoCo's points, but for a share of ties at most; how many they have."""
     with live(model, worlds=len(qpos), fields=FIELDS) as pair:
         frame = pair.place(at_rest(pair.model, qpos))
         qpos = frame.qpos.astype(float)
@@ -67,8 +67,8 @@ def compare(model: mujoco.MjModel, qpos: Array) -> set[int]:
             for world, own in enumerate(points)
             if apart(frame.contact_pos[world, : frame.contact_count[world]], own)
         ]
-        # ties, which MuJoCo decides otherwise where the pose moves by roundings: 1.8 % of an icosahedron's, on edges
-        assert len(others) <= 0.02 * len(qpos)
+        assert len(others) <= ties * len(qpos)
+        # MuJoCo decides a tie otherwise where the pose moves by roundings
         for world in others:
             near = qpos[world] + np.random.default_rng(10).normal(size=(64, 7)) * 1e-15
             assert any(apart(moved, points[world]) for moved in mujocos(pair.model, near)[0]), qpos[world].tolist()
@@ -165,7 +165,9 @@ def mesh_model(points: Array, margin: float, plane: str = "level") -> mujoco.MjM
 def test_points_of_a_mesh_on_a_plane_are_mujocos(name, margin):
     rng = np.random.default_rng([8, list(MESHES).index(name), int(100 * margin)])
     model = mesh_model(MESHES[name], margin, "level" if margin else "tilted")
-    assert compare(model, poses(rng, model, WORLDS)) >= {0, 1, 2, 3}
+    # straight ones on an edge, 1.8 % of all, have two sides that face the plane alike
+    ties = 0.02 if name == "icosahedron" else 0.0
+    assert compare(model, poses(rng, model, WORLDS), ties=ties) >= {0, 1, 2, 3}
 
 
 def test_a_prism_rests_on_mujocos_corners_of_its_many():

@@ -101,7 +101,7 @@ def _meant(task: type, name: str, is_call: bool, known: dict[str, bool]) -> str 
         return _MEANT[name]
     alike = [other for other, calls in known.items() if calls == is_call]
     near = difflib.get_close_matches(name.lower(), alike, n=1, cutoff=_LIKENESS)
-    # whoever defines the right one, too, has a reason for the other
+    # a class that defines the right one, too, has a reason for the other
     return near[0] if near and near[0] not in vars(task) else None
 
 
