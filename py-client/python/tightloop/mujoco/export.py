@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tightloop import advice, cache_files, named_files
 from tightloop.errors import SceneError
 from tightloop.file_kinds import instead, kind_of_file
-from tightloop.mujoco import textures
+from tightloop.mujoco import shared_frames, textures
 from tightloop.optional_imports import optional_import
 from tightloop.whole_files import whole_file
 
@@ -96,7 +96,10 @@ _NAMED = {
     "key": "nkey",
     "sensor": "nsensor",
 }
-_REAL_OPTIONS = ("timestep", "gravity", "tolerance", "impratio", "density", "viscosity", "wind", "magnetic")
+_REAL_OPTIONS = (
+    *("timestep", "gravity", "tolerance", "ls_tolerance", "impratio"),
+    *("density", "viscosity", "wind", "magnetic"),
+)
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor", "nsensordata")
 
@@ -156,6 +159,7 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     for name in _NEWER_ARRAYS:
         if hasattr(model, name):
             found[name] = _plain(getattr(model, name))
+    shared_frames.apply(model, found)
     for name, kind in _KINDS.items():
         members = {int(value): key for key, value in getattr(mujoco, kind).__members__.items()}
         values = np.asarray(getattr(model, name)).astype(int)
@@ -244,9 +248,9 @@ def _hulls(model: Any) -> dict[str, NDArray[Any]]:
 
 
 def _plain(array: Any) -> NDArray[Any]:
-    """An array as float64 or int32."""
+    """A copy of an array as float64 or int32."""
     array = np.asarray(array)
-    return np.ascontiguousarray(array, dtype=np.float64 if array.dtype.kind == "f" else np.int32)
+    return np.array(array, dtype=np.float64 if array.dtype.kind == "f" else np.int32, order="C")
 
 
 def as_bytes(given: list[str]) -> NDArray[np.uint8]:
