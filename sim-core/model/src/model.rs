@@ -273,6 +273,8 @@ impl Model {
         let text = text
             .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
             .replace(", scans: []", "")
+            .replace(", search: None", "")
+            .replace(DEFAULT_SEARCH, "")
             .replace(", turns: None", "")
             .replace(", mujoco_capsule_boxes: false", "")
             .replace(", link_axes: None", "")
@@ -287,6 +289,10 @@ impl Model {
         })
     }
 }
+
+/// What the `Debug` text of a model from MuJoCo says where its line search has MuJoCo's defaults.
+const DEFAULT_SEARCH: &str =
+    ", search: Some(Search { ls_tolerance: 0.01, islands: true, warm_start: true })";
 
 /// What the `Debug` text of a model says where the larger friction of two shapes counts.
 fn largest_friction() -> String {

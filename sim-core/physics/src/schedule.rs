@@ -14,10 +14,10 @@ pub fn step_stages<R: Real>(m: &Constants<R>) -> Vec<StageId> {
         return stages;
     }
     // a Runge-Kutta step evaluates its forces four times; commands come due once
-    let (ends, forces): (Vec<StageId>, Vec<StageId>) = stages
+    let (mut ends, forces): (Vec<StageId>, Vec<StageId>) = stages
         .into_iter()
         .partition(|stage| stage.name().starts_with("runge_kutta"));
-    let mut all = Vec::new();
+    let mut all = vec![ends.remove(0)];
     for (k, end) in ends.into_iter().enumerate() {
         let again = |stage: &&StageId| k == 0 || stage.name() != "command";
         all.extend(forces.iter().filter(again));

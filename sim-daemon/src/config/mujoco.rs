@@ -82,7 +82,14 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
         } else {
             ", refsafe off"
         };
-        format!("{:?}{implicit}{safe}", parts.integrator)
+        let islands = if parts.islands { "" } else { ", island off" };
+        let warm = if parts.warm_start {
+            ""
+        } else {
+            ", warmstart off"
+        };
+        let (kind, ls_tolerance) = (parts.integrator, parts.ls_tolerance);
+        format!("{kind:?}{implicit}{safe}{islands}{warm}, ls_tolerance {ls_tolerance}")
     });
     summary["options"] = json!({
         "integrator": integrator,

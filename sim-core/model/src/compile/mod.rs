@@ -36,9 +36,9 @@ use contact_pieces::{Rules, connected, placed_shapes};
 use contacts::add_contacts;
 use inverse_weight::Reference;
 use sim_physics::constants::contact::Contacts;
-use sim_physics::constants::mujoco::{Actuator, Integrator, Mujoco};
+use sim_physics::constants::mujoco::{Actuator, Integrator, Mujoco, Search};
 use sim_physics::constants::params::{Param, SceneStarts, Varying};
-use sim_physics::constants::{Constants, Coupled, Delay, Newton};
+use sim_physics::constants::{Body, Constants, Coupled, Delay, Newton};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -146,6 +146,13 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     check_models(scene)?;
     if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
         constants.mujoco.integrator = parts.integrator;
+        constants.mujoco.search = Some(Search {
+            tolerance: scene.solver.tolerance,
+            ls_tolerance: parts.ls_tolerance,
+            islands: parts.islands,
+            warm_start: parts.warm_start,
+            roots: roots(&constants.bodies),
+        });
         constants.damped = is_damped(&constants, scene, parts.implicit_damping);
     }
     let shape_names = scene.shape_names();
@@ -250,6 +257,20 @@ fn take_inverse_weights(scene: &Description, ranges: &[RobotRange], reference: &
     }
 }
 
+/// Of each dof, the first one of its kinematic tree.
+fn roots(bodies: &[Body<f64>]) -> Vec<usize> {
+    let mut of_dofs: Vec<usize> = Vec::new();
+    let mut of_bodies: Vec<Option<usize>> = Vec::new();
+    for body in bodies {
+        let above = body.parent.and_then(|parent| of_bodies[parent]);
+        let dofs = body.motion.dofs();
+        let root = above.or((dofs > 0).then_some(body.dof));
+        of_bodies.push(root);
+        of_dofs.extend(std::iter::repeat_n(root.unwrap_or(body.dof), dofs));
+    }
+    of_dofs
+}
+
 /// Refuses models from MuJoCo that do not fit together, or that a parameter would change in silence.
 fn check_models(scene: &Description) -> Result<(), ModelError> {
     let models = scene.robots.iter().filter(|robot| robot.mujoco.is_some());
@@ -259,6 +280,8 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
             parts.integrator,
             parts.implicit_damping,
             parts.safe_references,
+            parts.ls_tolerance,
+            [parts.islands, parts.warm_start],
         ))
     };
     let models: Vec<&Robot> = models.collect();
@@ -268,7 +291,8 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
     {
         return Err(ModelError::MujocoRefused {
             reasons: format!(
-                "models `{}` and `{}` have different integrators, eulerdamp or refsafe; make them equal",
+                "models `{}` and `{}` have different integrators, ls_tolerance, or flags eulerdamp, refsafe, \
+                 island or warmstart; make them equal",
                 two[0].name, two[1].name
             ),
         });

@@ -50,6 +50,12 @@ pub struct MujocoParts {
     pub touches_parent: bool,
     /// How a step integrates velocities.
     pub integrator: Integrator,
+    /// Share of the solver's tolerance to which it searches a line in `f64` [–].
+    pub ls_tolerance: f64,
+    /// Whether the solver handles trees that no constraint couples one by one in `f64`.
+    pub islands: bool,
+    /// Whether the solver may start from the last step's accelerations in `f64`.
+    pub warm_start: bool,
     /// Whether Euler's step is implicit in the damping of joints.
     pub implicit_damping: bool,
     /// Whether time constants are at least two steps.

@@ -196,6 +196,14 @@ impl ModelFile {
         Ok(self.reals(name, 1)?[0])
     }
 
+    /// One number; `other` where files of older versions lack it.
+    pub fn real_or(&self, name: &str, other: f64) -> Result<f64, ModelError> {
+        match self.arrays.contains_key(name) {
+            true => self.real(name),
+            false => Ok(other),
+        }
+    }
+
     /// One integer.
     pub fn integer(&self, name: &str) -> Result<i64, ModelError> {
         Ok(self.integers(name, 1)?[0])

@@ -118,12 +118,18 @@ fn parts(
         pairs: Vec::new(),
         touches_parent: has_flag(file, "mjDSBL_FILTERPARENT")?,
         integrator: integrator(file)?,
+        ls_tolerance: file.real_or("opt.ls_tolerance", LS_TOLERANCE)?,
+        islands: !has_flag(file, "mjDSBL_ISLAND")?,
+        warm_start: !has_flag(file, "mjDSBL_WARMSTART")?,
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
         safe_references: !has_flag(file, "mjDSBL_REFSAFE")?,
         frames: frames::frames(file, bodies)?,
         sensors: SensorParts::default(),
     })
 }
+
+/// `ls_tolerance` of files that older versions wrote: MuJoCo's default [–].
+const LS_TOLERANCE: f64 = 0.01;
 
 /// Arrays of joints and dofs.
 struct JointArrays {

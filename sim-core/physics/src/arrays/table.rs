@@ -79,6 +79,8 @@ arrays! { m;
         // iterations of the solver, line searches and their evaluations so far, for a profile: of each world, and of the block
         solver_work: SolverWork [3] Scratch "–";
         solver_block_work: SolverBlockWork [3] Scratch "–";
+        // 1 where the solver has not ended, at the first dof of an island
+        busy: Busy [m.island_dofs()] Scratch "–";
         // contacts that a sensor shows
         contact_records: ContactRecords [17 * m.mujoco.sensors.records] Scratch "–";
         // torque, then force, of the contacts of each body of MuJoCo models
@@ -152,6 +154,8 @@ arrays! { m;
         rk_velocity: RkVelocity [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
         rk_velocity_sum: RkVelocitySum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
         rk_acceleration_sum: RkAccelerationSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
+
+        rk_warm_start: RkWarmStart [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
         // the same of activations: where they began, and sums of their rates
         rk_act: RkAct [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.mujoco.activations } else { 0 }] Stage "–";
@@ -247,6 +251,9 @@ arrays! { m;
         acceleration: Acceleration [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";
         joint_force: JointForce [Scalar; m.dofs.len()] Scratch "N·m or N";
         missing: Missing [Scalar; m.dofs.len()] Scratch "N·m or N";
+        // M a - τ, and the island of each dof, where the solver runs as MuJoCo's: see `step::solver::islands`
+        gauss_gradient: GaussGradient [Scalar; m.island_dofs()] Scratch "N·m or N";
+        island: Island [Scalar; m.island_dofs()] Scratch "–";
         // row by row: J a - aref at the start, at the minimum (or its change), D, aref, force; distance to each limit
         jar: Jar [Scalar; m.rows()] Scratch "rad/s² or m/s²";
         jar_minimum: JarMinimum [Scalar; m.rows()] Scratch "rad/s² or m/s²";

@@ -20,7 +20,7 @@ pub use self::recast::Recast;
 pub use self::sizes::Sizes;
 
 use self::contact::Contacts;
-use self::mujoco::Mujoco;
+use self::mujoco::{Mujoco, Search};
 use self::params::{COMMAND_NOISES, Varying};
 use self::recast::{recast, same};
 use self::scan::HeightScan;
@@ -374,6 +374,17 @@ recast! {
 }
 
 impl<R: Real> Constants<R> {
+    /// How the solver runs as MuJoCo's: for its models in `f64`.
+    #[inline(always)]
+    pub fn mujoco_search(&self) -> Option<&Search<R>> {
+        self.mujoco.search.as_ref().filter(|_| R::DOUBLE)
+    }
+
+    /// Dofs for which the solver keeps islands.
+    pub fn island_dofs(&self) -> usize {
+        self.mujoco_search().map_or(0, |_| self.dofs.len())
+    }
+
     /// The same constants, rounded to another precision.
     pub fn cast<S: Real>(&self) -> Constants<S>
     where

@@ -26,6 +26,8 @@ recast! {
     pub struct Mujoco<R> {
         /// How a step integrates velocities.
         pub integrator: Integrator,
+        /// How the solver ends its iterations and line searches in `f64`.
+        pub search: Option<Search<R>>,
         /// Springs of joints.
         pub springs: Vec<Spring<R>>,
         /// Springs of balls and free joints.
@@ -79,6 +81,7 @@ impl<R> Default for Mujoco<R> {
     fn default() -> Mujoco<R> {
         Mujoco {
             integrator: Integrator::default(),
+            search: None,
             springs: Vec::new(),
             pose_springs: Vec::new(),
             free_joints: Vec::new(),
@@ -103,6 +106,41 @@ impl<R> Default for Mujoco<R> {
             pair_bodies: Fixed::default(),
             class_bodies: Vec::new(),
         }
+    }
+}
+
+recast! {
+    /// Options of MuJoCo's solver, and the parts that it may solve one by one.
+    #[derive(Clone)]
+    pub struct Search<R> {
+        /// Improvement, gradient and expected gain below which an island ends, over the trace of its mass matrix.
+        pub tolerance: R,
+        /// Share of the tolerance to which a line is searched.
+        pub ls_tolerance: R,
+        /// Whether trees that no constraint couples are solved one by one.
+        pub islands: bool,
+        /// Whether the last step's accelerations may be the start.
+        pub warm_start: bool,
+        /// Of each dof, the first one of its kinematic tree.
+        pub roots: Vec<usize>,
+    }
+}
+
+impl<R> Search<R> {
+    /// The first dofs of trees, after which islands are named.
+    pub fn islands_of(&self, dofs: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..dofs).filter(|&dof| self.roots[dof] == dof)
+    }
+}
+
+impl<R: std::fmt::Debug> std::fmt::Debug for Search<R> {
+    /// Shows what is not derived from other constants: the text is part of the model's hash.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Search")
+            .field("ls_tolerance", &self.ls_tolerance)
+            .field("islands", &self.islands)
+            .field("warm_start", &self.warm_start)
+            .finish()
     }
 }
 

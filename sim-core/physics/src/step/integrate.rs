@@ -24,6 +24,7 @@
 //! ```
 
 use super::kinematics::read_quat;
+use super::mujoco_state::keep_accelerations;
 use super::{BlockOf, ConstantsOf, Stage, actuators, fluid, free_joints, masses, param};
 use crate::arrays::Array as A;
 use crate::constants::actuator::Activation;
@@ -61,7 +62,14 @@ impl Stage for Integrate {
         A::ConstraintForce,
     ];
     // the last stage of a step: the mass matrix is not read after it
-    const WRITES: &'static [A] = &[A::JointQ, A::JointQRest, A::JointQd, A::Act, A::MassMatrix];
+    const WRITES: &'static [A] = &[
+        A::JointQ,
+        A::JointQRest,
+        A::JointQd,
+        A::JointQdd,
+        A::Act,
+        A::MassMatrix,
+    ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
         m.mujoco.integrator != Integrator::RungeKutta
@@ -75,6 +83,9 @@ impl Stage for Integrate {
             for j in 0..m.dofs.len() {
                 b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
             }
+        }
+        if m.mujoco_search().is_some() {
+            keep_accelerations(cx, m, b);
         }
         for (k, body) in m.bodies.iter().enumerate() {
             if body.motion == Motion::Free {

@@ -93,7 +93,8 @@ macro_rules! every_stage {
             solver_turning     [solver::Solver::<true>]      Both;
             refine             [solver::Refine]              Both;
             integrate          [integrate::Integrate]        Step;
-            // in its place: all above four times, each followed by one of these
+            // in its place: the first of these, then all above four times, each followed by one of the others
+            runge_kutta_0      [runge_kutta::Begin]          Step;
             runge_kutta_1      [runge_kutta::RungeKutta::<0>] Step;
             runge_kutta_2      [runge_kutta::RungeKutta::<1>] Step;
             runge_kutta_3      [runge_kutta::RungeKutta::<2>] Step;

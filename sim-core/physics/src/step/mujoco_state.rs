@@ -37,14 +37,68 @@ pub fn accelerations<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut
         *x = cx.get(cell);
     }
     for (k, dof) in free_bodies(m) {
-        let [linear, angular] = halves(&to[dof..]);
-        let origin = b.work.origin[k];
-        let spin = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qd[dof + 3 + i])));
-        let swing = spin.cross_add(spin.cross(origin), linear);
-        let linear = angular.cross_add(origin, swing);
+        let (linear, angular) = accelerations_of(cx, b, k, dof);
         to[dof..dof + 3].copy_from_slice(&linear.0);
-        let own = b.work.rotation[k].transpose_mul(angular);
-        to[dof + 3..dof + 6].copy_from_slice(&own.0);
+        to[dof + 3..dof + 6].copy_from_slice(&angular.0);
+    }
+}
+
+/// Turns `joint_qdd` into MuJoCo's accelerations: the next solve starts from these at another pose and velocity.
+#[inline(always)]
+pub fn keep_accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    for (k, dof) in free_bodies(m) {
+        let (linear, angular) = accelerations_of(cx, b, k, dof);
+        set_accelerations(cx, b, dof, linear, angular);
+    }
+}
+
+/// Turns MuJoCo's accelerations that [`keep_accelerations`] left in `joint_qdd` into those of the pose and velocity of now.
+#[inline(always)]
+pub fn take_accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    for (k, dof) in free_bodies(m) {
+        let [linear, angular, spin] = motion_of(cx, b, dof);
+        let origin = b.work.origin[k];
+        let angular = &b.work.rotation[k] * angular;
+        let swing = spin.cross(spin.cross(origin)) + angular.cross(origin);
+        set_accelerations(cx, b, dof, linear - swing, angular);
+    }
+}
+
+/// Linear and angular acceleration of a free body, and its angular velocity.
+#[inline(always)]
+fn motion_of<C: Cx>(cx: &C, b: &BlockOf<C>, dof: usize) -> [Vec3<C::F>; 3] {
+    let linear = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qdd[dof + i])));
+    let angular = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qdd[dof + 3 + i])));
+    let spin = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qd[dof + 3 + i])));
+    [linear, angular, spin]
+}
+
+/// MuJoCo's linear and angular acceleration of a free body.
+#[inline(always)]
+fn accelerations_of<C: Cx>(
+    cx: &C,
+    b: &BlockOf<C>,
+    body: usize,
+    dof: usize,
+) -> (Vec3<C::F>, Vec3<C::F>) {
+    let [linear, angular, spin] = motion_of(cx, b, dof);
+    let origin = b.work.origin[body];
+    let swing = spin.cross_add(spin.cross(origin), linear);
+    let linear = angular.cross_add(origin, swing);
+    (linear, b.work.rotation[body].transpose_mul(angular))
+}
+
+#[inline(always)]
+fn set_accelerations<C: Cx>(
+    cx: &mut C,
+    b: &mut BlockOf<C>,
+    dof: usize,
+    linear: Vec3<C::F>,
+    angular: Vec3<C::F>,
+) {
+    for i in 0..3 {
+        cx.set(&mut b.joint_qdd[dof + i], linear.0[i]);
+        cx.set(&mut b.joint_qdd[dof + 3 + i], angular.0[i]);
     }
 }
 

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Velocities v are MuJoCo's ([`super::mujoco_state`]). ⊕ turns a quaternion by h v in the body's axes. All stages of a step run
-//! before each of the four, at xₖ.
+//! before each of the four, at xₖ. The solver starts each of the four from the accelerations of the last step.
 
 use super::actuators::next;
 use super::integrate::{activations, add_compensated, write_quat};
@@ -28,6 +28,25 @@ const REACHES: [f64; 3] = [0.5, 0.5, 1.0];
 /// Number `K` of the four evaluations, from 0: goes to the next point, or to the next state.
 pub struct RungeKutta<const K: usize>;
 
+/// Keeps the accelerations that the solver starts from, before the first evaluation.
+pub struct Begin;
+
+impl Stage for Begin {
+    const READS: &'static [A] = &[A::JointQdd];
+    const WRITES: &'static [A] = &[A::RkWarmStart];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        m.mujoco.integrator == Integrator::RungeKutta
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        for j in 0..m.dofs.len() {
+            b.work.rk_warm_start[j] = cx.get(&b.joint_qdd[j]);
+        }
+    }
+}
+
 /// What the first evaluation reads.
 const READS: &[A] = &[
     A::JointQ,
@@ -38,6 +57,7 @@ const READS: &[A] = &[
     A::Origin,
     A::Act,
     A::ActDot,
+    A::RkWarmStart,
 ];
 /// What those after it read.
 const READS_LATER: &[A] = &[
@@ -56,6 +76,7 @@ const READS_LATER: &[A] = &[
     A::ActDot,
     A::RkAct,
     A::RkActRateSum,
+    A::RkWarmStart,
 ];
 
 impl<const K: usize> Stage for RungeKutta<K> {
@@ -64,6 +85,7 @@ impl<const K: usize> Stage for RungeKutta<K> {
         A::JointQ,
         A::JointQRest,
         A::JointQd,
+        A::JointQdd,
         A::RkQ,
         A::RkQRest,
         A::RkVelocity,
@@ -92,6 +114,17 @@ impl<const K: usize> Stage for RungeKutta<K> {
                 w.rk_q_rest[c] = cx.get(&b.joint_q_rest[c]);
             }
             w.rk_velocity.copy_from_slice(&velocity);
+        }
+        if K < 3 {
+            for j in 0..m.dofs.len() {
+                cx.set(&mut b.joint_qdd[j], w.rk_warm_start[j]);
+            }
+        } else if m.mujoco_search().is_some() {
+            for (_, dof) in free_bodies(m) {
+                for j in dof..dof + 6 {
+                    cx.set(&mut b.joint_qdd[j], acceleration[j]);
+                }
+            }
         }
         let share = C::F::c(SHARES[K]);
         for j in 0..m.dofs.len() {

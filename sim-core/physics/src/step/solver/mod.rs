@@ -16,7 +16,7 @@
 //! line search on the segment finds the next `a` (in `f32` only after three whole steps, or where these may overshoot, as with
 //! stiff pyramids). The
 //! start is the result of the last step, so mostly one iteration is enough. In `f64`, the reference, the start is chosen as in
-//! MuJoCo (see [`choose_start`]).
+//! MuJoCo ([`start`]).
 //!
 //! # Rows
 //!
@@ -26,9 +26,9 @@
 //!
 //! # Precision
 //!
-//! In `f64` the start and the line search are MuJoCo's, so runs agree with it to rounding even where its tolerance stops it
-//! early. In `f32` a whole step is tried three times before a search, unless a dry friction turned, since whole steps then
-//! oscillate.
+//! In `f64` the start is MuJoCo's. For models from MuJoCo its iterations and line search are, too ([`newton`]): runs agree
+//! with it to rounding even where its options stop it early. In `f32` a whole step is tried three times before a search,
+//! unless a dry friction turned, since whole steps then oscillate.
 //!
 //! Contacts are up to 10⁶ times as stiff as bodies are heavy. So in worlds that touch, an iteration solves for the step
 //! a⁺ - a, not for a⁺. It ends where the gain is what rounding alone would promise ([`Line::noise`]). A whole step that found
@@ -54,23 +54,30 @@
 //! | `ties` | sums over constraints with Jacobians found at run time |
 //! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
 //! | `turning` | laws of contacts with torsional and rolling friction |
+//! | `start` | where `f64` starts |
 //! | `line` | the line search |
+//! | `newton`, `bracket`, `contact_line`, `islands` | MuJoCo's iterations and line search, for its models in `f64` |
 //! | `own_rows` | its rows of joints, where several lanes share a world |
 //! | `hold` | contacts that slide, and are assumed to stick |
 //! | `progress` | which worlds search, and which have arrived |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
 
 mod assembly;
+mod bracket;
 mod cones;
+mod contact_line;
 mod contacts;
 mod hold;
+mod islands;
 mod line;
 mod linear;
+mod newton;
 mod own_rows;
 mod progress;
 mod refine;
 mod rows;
 mod spread;
+mod start;
 mod ties;
 mod turning;
 
@@ -82,14 +89,15 @@ use crate::constants::Constants;
 use crate::constants::contact::row;
 use crate::constants::ties::TieLaw;
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::factor::{multiply, solve as solve_linear};
+use crate::math::factor::multiply;
 use crate::{break_if, times, when};
 use hold::Hold;
 use line::{Line, search};
 use own_rows::own_rows;
 use progress::{Found, Pieces, Plan, Progress};
-use rows::{Acting, Jacobian, assemble, cost, forces, residual};
+use rows::{Acting, Jacobian, assemble, forces, residual};
 use spread::Spread;
+use start::choose_start;
 
 /// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
 /// solver without code for it.
@@ -97,9 +105,12 @@ pub struct Solver<const TURNS: bool>;
 
 impl<const TURNS: bool> Stage for Solver<TURNS> {
     const READS: &'static [A] = &[
+        A::JointQd,
         A::JointQdd,
         A::Unconverged,
         A::Params,
+        A::Rotation,
+        A::Origin,
         A::MassMatrix,
         A::SmoothForce,
         A::EfcD,
@@ -140,6 +151,20 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
     let coupling = linear::coupling(cx, m, corrects);
+    // a constant first: precisions that never run this are compiled without it
+    if <<C::F as Num>::Real as Real>::DOUBLE
+        && let Some(search) = m.mujoco_search()
+    {
+        let problem = newton::Problem {
+            search,
+            acting,
+            corrects,
+            coupling,
+        };
+        newton::solve::<C, TURNS>(cx, m, b, &problem);
+        constraint_forces::<C, TURNS>(cx, m, b, acting);
+        return;
+    }
     let spread = match corrects {
         Some(_) if !TURNS => Spread::new(cx, m, &b.work.mass_matrix),
         _ => None,
@@ -415,62 +440,4 @@ fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
         stiffest = one;
     }
     zero.lt(stiffest)
-}
-
-/// Starts from M⁻¹ τ where that costs less than the last step's result (MuJoCo: `mj_warmstart`).
-///
-/// The minimum is the same, but where the tolerance stops the solver depends on the start by up to 5e-4 in q̈, which the
-/// reference must reproduce. In `f32` it is not worth a factorisation and extra iterations: from a start without constraints
-/// more rows change their piece.
-#[inline(always)]
-fn choose_start<C: Cx, const TURNS: bool>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &mut BlockOf<C>,
-    acting: Acting,
-) {
-    let n = m.dofs.len();
-    let w = &mut b.work;
-    let (warm, smooth, ahead) = (&mut w.start, &mut w.minimum, &mut w.step);
-    let (jar, jar_smooth) = (&mut w.jar, &mut w.jar_minimum);
-    let (weight, aref) = (&w.row_weight, &w.row_aref);
-    w.hessian.copy_from_slice(&w.mass_matrix);
-    smooth.copy_from_slice(&w.smooth_force);
-    solve_linear(&m.pattern, &mut w.hessian, smooth);
-    for j in 0..n {
-        warm[j] = cx.get(&b.joint_qdd[j]);
-        ahead[j] = warm[j] - smooth[j];
-    }
-    residual(
-        m,
-        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
-        aref,
-        warm,
-        jar,
-    );
-    residual(
-        m,
-        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
-        aref,
-        smooth,
-        jar_smooth,
-    );
-    multiply(&m.pattern, &w.mass_matrix, ahead, &mut w.joint_force);
-    let mut gauss = C::F::c(0.0);
-    for j in 0..n {
-        gauss = ahead[j].fma(w.joint_force[j], gauss);
-    }
-    let mut cost_warm = cx.var(gauss.fma(C::F::c(0.5), cost(m, &b.params, acting, [weight, jar])));
-    let mut cost_smooth = cx.var(cost(m, &b.params, acting, [weight, jar_smooth]));
-    contacts::residual::<_, TURNS>(cx, &m.contacts, warm, row::JAR);
-    contacts::residual::<_, TURNS>(cx, &m.contacts, smooth, row::AHEAD);
-    contacts::cost::<_, TURNS>(cx, &m.contacts, row::JAR, &mut cost_warm);
-    contacts::cost::<_, TURNS>(cx, &m.contacts, row::AHEAD, &mut cost_smooth);
-    let cheaper = cx.get(&cost_smooth).lt(cx.get(&cost_warm));
-    for j in 0..n {
-        cx.set(
-            &mut b.joint_qdd[j],
-            C::F::select(cheaper, smooth[j], warm[j]),
-        );
-    }
 }

@@ -1,0 +1,288 @@
+//! MuJoCo's line search: Newton's method from the start of a line until the slope changes its sign, then a bracket.
+//!
+//! A bracket has two ends, one on each side of the minimum. Each iteration tries three points: the middle, and where Newton's
+//! method leads from each end. One of them with a slope below the bound is the answer. Otherwise each end moves to the point
+//! on its side with the smaller slope. Where no end moves, rounding is reached and the middle is the answer (MuJoCo
+//! documentation, "Computation: solvers"; the details are found by experiment with MuJoCo 3.17).
+
+use super::contact_line;
+use super::rows::{Acting, Law, bounds, dry_cost, dry_friction, equality, one_sided};
+use super::ties;
+use crate::arrays::Workspace;
+use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::step::ConstantsOf;
+use crate::{break_if, times, when};
+
+/// Roundings in the slope at the start of a line, in units of the size of its terms: a smaller slope is no descent [–].
+const ROUNDINGS: f64 = 8.0;
+
+/// A line through the cost: accelerations `start` + α `step`, residuals `jar` + α `jar_minimum`.
+pub(super) struct Segment<'a, F> {
+    pub params: &'a [F],
+    pub w: &'a Workspace<F>,
+    pub acting: Acting,
+    /// First and second derivative of ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) at the start.
+    pub gauss: [F; 2],
+    /// The size of the slope below which the search ends.
+    pub bound: F,
+}
+
+/// Sums over constraint rows at a point of the line.
+struct Sums<F> {
+    cost: F,
+    slope: F,
+    curvature: F,
+    /// Size of the terms of the slope.
+    size: F,
+}
+
+impl<F: Num> Sums<F> {
+    fn add(&mut self, law: &Law<F>, jv: F, costs: [F; 2]) {
+        self.cost = self.cost + (costs[1] - costs[0]);
+        self.slope = law.force.fnma(jv, self.slope);
+        self.curvature = (law.stiffness * jv).fma(jv, self.curvature);
+        self.size = self.size + (law.force * jv).abs();
+    }
+}
+
+/// A point of the line.
+struct Point<C: Cx> {
+    alpha: C::V,
+    /// Less that at the start.
+    cost: C::V,
+    slope: C::V,
+    curvature: C::V,
+    /// Size of the terms of the slope.
+    size: C::V,
+}
+
+impl<C: Cx> Point<C> {
+    fn copy(&self, cx: &mut C) -> Point<C> {
+        let [alpha, cost, slope, curvature, size] = self.values(cx).map(|x| cx.var(x));
+        Point {
+            alpha,
+            cost,
+            slope,
+            curvature,
+            size,
+        }
+    }
+
+    fn values(&self, cx: &C) -> [C::F; 5] {
+        let derivatives = [&self.slope, &self.curvature, &self.size].map(|cell| cx.get(cell));
+        let [slope, curvature, size] = derivatives;
+        [
+            cx.get(&self.alpha),
+            cx.get(&self.cost),
+            slope,
+            curvature,
+            size,
+        ]
+    }
+
+    fn set(&mut self, cx: &mut C, values: [C::F; 5]) {
+        let [alpha, cost, slope, curvature, size] = values;
+        cx.set(&mut self.size, size);
+        cx.set(&mut self.alpha, alpha);
+        cx.set(&mut self.cost, cost);
+        cx.set(&mut self.slope, slope);
+        cx.set(&mut self.curvature, curvature);
+    }
+
+    /// Where Newton's method leads.
+    fn newton(&self, cx: &C) -> C::F {
+        cx.get(&self.alpha) - cx.get(&self.slope).div(cx.get(&self.curvature))
+    }
+
+    /// Moves an end of a bracket to the candidate on its side whose slope is the smallest. Returns where it moved.
+    fn advance(&mut self, cx: &mut C, candidates: [&Point<C>; 3]) -> MaskOf<C> {
+        let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+        let mut moved = zero;
+        for candidate in candidates {
+            let (own, other) = (cx.get(&self.slope), cx.get(&candidate.slope));
+            let rises = own.lt(zero) & other.lt(zero) & own.lt(other);
+            let falls = zero.lt(own) & zero.lt(other) & other.lt(own);
+            let takes = rises | falls;
+            let (before, after) = (self.values(cx), candidate.values(cx));
+            let next = [0, 1, 2, 3, 4].map(|i| C::F::select(takes, after[i], before[i]));
+            self.set(cx, next);
+            moved = C::F::select(takes, one, moved);
+        }
+        C::F::c(0.5).lt(moved)
+    }
+}
+
+/// What a search found.
+pub(super) struct Answer<C: Cx> {
+    /// α of the next accelerations; 0 where no point costs less than the start.
+    pub alpha: C::V,
+    /// Its cost less that at the start.
+    pub cost: C::V,
+    ended: C::V,
+}
+
+impl<C: Cx> Answer<C> {
+    /// Ends the search at a point in the worlds of the mask.
+    fn take(&mut self, cx: &mut C, at: MaskOf<C>, point: &Point<C>) {
+        let [alpha, cost, ..] = point.values(cx);
+        let (alpha_before, cost_before) = (cx.get(&self.alpha), cx.get(&self.cost));
+        cx.set(&mut self.alpha, C::F::select(at, alpha, alpha_before));
+        cx.set(&mut self.cost, C::F::select(at, cost, cost_before));
+        let ended = cx.get(&self.ended);
+        cx.set(&mut self.ended, C::F::select(at, C::F::c(1.0), ended));
+    }
+
+    fn has_ended(&self, cx: &C) -> MaskOf<C> {
+        C::F::c(0.5).lt(cx.get(&self.ended))
+    }
+}
+
+/// Searches the line.
+pub(super) fn search<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    line: &Segment<'_, C::F>,
+    counts: (&mut C::V, &mut C::V),
+) -> Answer<C> {
+    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+    let most = C::F::c(m.solver.ls_iterations as f64 - 0.5);
+    let mut answer = Answer {
+        alpha: cx.var(zero),
+        cost: cx.var(zero),
+        ended: cx.var(zero),
+    };
+    // counted as MuJoCo does, which bounds evaluations and not iterations
+    let mut evaluations = cx.var(zero);
+    macro_rules! point {
+        ($alpha:expr) => {{
+            let alpha = $alpha;
+            let count = cx.get(&evaluations) + one;
+            cx.set(&mut evaluations, count);
+            cx.tally(counts.0, counts.1);
+            line.point::<C, TURNS>(cx, m, alpha)
+        }};
+    }
+    let start = point!(zero);
+    // or only rounding is left, which no further iteration brings down
+    let epsilon = C::F::c(<<C::F as Num>::Real as Real>::EPSILON);
+    let rounding = cx.get(&start.size) * epsilon * C::F::c(ROUNDINGS);
+    let arrived = cx.get(&start.slope).abs().lt(rounding);
+    answer.take(cx, arrived, &start);
+    let mut first = point!(start.newton(cx));
+    let is_close = |cx: &C, point: &Point<C>| {
+        let bound = line.bound.max(cx.get(&point.size) * epsilon);
+        cx.get(&point.slope).abs().lt(bound)
+    };
+    let close = is_close(cx, &first) & !arrived;
+    answer.take(cx, close, &first);
+    let ahead = C::F::select(cx.get(&first.slope).lt(zero), one, -one);
+    let mut second = first.copy(cx);
+    times!(cx, m.solver.ls_iterations, {
+        let crossed = (-line.bound).lt(cx.get(&first.slope) * ahead);
+        let spent = most.lt(cx.get(&evaluations));
+        break_if!(cx, crossed | spent | answer.has_ended(cx));
+        let values = first.values(cx);
+        second.set(cx, values);
+        let next = point!(first.newton(cx)).values(cx);
+        first.set(cx, next);
+        let close = is_close(cx, &first);
+        answer.take(cx, close, &first);
+    });
+    let spent = most.lt(cx.get(&evaluations));
+    let ends = spent & !answer.has_ended(cx);
+    answer.take(cx, ends, &first);
+    let goes_on = !answer.has_ended(cx);
+    when!(cx, goes_on, {
+        let mut from_second = first.copy(cx);
+        let mut from_first = point!(first.newton(cx));
+        times!(cx, m.solver.ls_iterations, {
+            let spent = most.lt(cx.get(&evaluations));
+            break_if!(cx, spent | answer.has_ended(cx));
+            let middle = point!(half * (cx.get(&first.alpha) + cx.get(&second.alpha)));
+            let mut found = zero;
+            for candidate in [&from_first, &from_second, &middle] {
+                let costs_less = cx.get(&candidate.cost).lt(cx.get(&answer.cost));
+                let better = costs_less | found.lt(half);
+                let takes = is_close(cx, candidate) & better;
+                answer.take(cx, takes, candidate);
+                found = C::F::select(takes, one, found);
+            }
+            break_if!(cx, half.lt(found));
+            let before = from_first.copy(cx);
+            let candidates = [&before, &from_second, &middle];
+            let first_moved = first.advance(cx, candidates);
+            when!(cx, first_moved, {
+                let next = point!(first.newton(cx)).values(cx);
+                from_first.set(cx, next);
+            });
+            let second_moved = second.advance(cx, candidates);
+            when!(cx, second_moved, {
+                let next = point!(second.newton(cx)).values(cx);
+                from_second.set(cx, next);
+            });
+            answer.take(cx, !first_moved & !second_moved, &middle);
+        });
+        // evaluations are spent: the end that costs less, if it costs less than the start
+        let open = !answer.has_ended(cx);
+        let (cost, other) = (cx.get(&first.cost), cx.get(&second.cost));
+        let is_first = !other.lt(cost);
+        answer.take(cx, open & is_first & cost.lt(zero), &first);
+        answer.take(cx, open & !is_first & other.lt(zero), &second);
+    });
+    answer
+}
+
+impl<F: Num> Segment<'_, F> {
+    /// The cost and its derivatives at α.
+    fn point<C: Cx<F = F>, const TURNS: bool>(
+        &self,
+        cx: &mut C,
+        m: &ConstantsOf<C>,
+        alpha: F,
+    ) -> Point<C> {
+        let half = F::c(0.5);
+        let [slope, curvature] = self.gauss;
+        let mut sums = Sums {
+            cost: alpha * (half * alpha).fma(curvature, slope),
+            slope: alpha.fma(curvature, slope),
+            curvature,
+            size: slope.abs() + (alpha * curvature).abs(),
+        };
+        let (jar, jv, weight) = (&self.w.jar, &self.w.jar_minimum, &self.w.row_weight);
+        let there = |r: usize| alpha.fma(jv[r], jar[r]);
+        let mut r = 0;
+        for _ in &m.equalities {
+            let costs = [jar[r], there(r)].map(|jar| half * weight[r] * jar * jar);
+            sums.add(&equality(there(r), weight[r]), jv[r], costs);
+            r += 1;
+        }
+        for friction in &m.frictions {
+            let [zone, loss] = bounds(m, self.params, friction);
+            let costs = [jar[r], there(r)].map(|jar| dry_cost(jar, weight[r], zone, loss));
+            let law = dry_friction(there(r), weight[r], zone, loss);
+            sums.add(&law, jv[r], costs);
+            r += 1;
+        }
+        for r in self.acting.runs().flatten().map(|limit| r + limit) {
+            let costs =
+                [jar[r], there(r)].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
+            sums.add(&one_sided(there(r), weight[r]), jv[r], costs);
+        }
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
+            let law = &m.mujoco.ties[*tie].law;
+            let costs = [jar[r], there(r)].map(|jar| ties::cost(law, jar, weight[r]));
+            sums.add(&ties::law(law, there(r), weight[r]), jv[r], costs);
+        }
+        let all = [sums.cost, sums.slope, sums.curvature, sums.size];
+        let mut cells = all.map(|sum| cx.var(sum));
+        contact_line::add::<_, TURNS>(cx, &m.contacts, alpha, &mut cells);
+        let [cost, slope, curvature, size] = cells;
+        Point {
+            alpha: cx.var(alpha),
+            cost,
+            slope,
+            curvature,
+            size,
+        }
+    }
+}

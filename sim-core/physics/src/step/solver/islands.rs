@@ -1,0 +1,194 @@
+//! Islands: kinematic trees that constraints couple, which MuJoCo solves one by one.
+//!
+//! A dof's island is the first dof of the first of its trees. Where no constraint acts on a tree, the number of dofs is added:
+//! its accelerations are M⁻¹ τ. MuJoCo measures an island by the trace of its mass matrix (`mj_island`; the measure is found
+//! by experiment with MuJoCo 3.17).
+
+use super::super::mujoco_state::{free_bodies, halves};
+use super::contacts;
+use super::rows::Acting;
+use crate::arrays::Workspace;
+use crate::constants::Constants;
+use crate::constants::mujoco::Search;
+use crate::lane::{Cx, MaskOf, Num};
+use crate::math::vec3::Vec3;
+use crate::step::{BlockOf, ConstantsOf};
+
+/// Writes the island of each dof.
+#[inline(always)]
+pub(super) fn find<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    search: &Search<<C::F as Num>::Real>,
+    b: &mut BlockOf<C>,
+    acting: Acting,
+) {
+    let w = &mut b.work;
+    let (island, weight) = (&mut w.island, &w.row_weight);
+    let dofs = m.dofs.len();
+    for (island, root) in island.iter_mut().zip(&search.roots) {
+        *island = C::F::c((root + dofs) as f64);
+    }
+    let mut links = Links { search, island };
+    let zero = C::F::c(0.0);
+    let mut r = 0;
+    for e in &m.equalities {
+        links.add(cx, [e.follower, e.leader], zero.lt(weight[r]));
+        r += 1;
+    }
+    for f in &m.frictions {
+        links.add(cx, [f.dof], zero.lt(weight[r]));
+        r += 1;
+    }
+    for l in acting.runs().flatten() {
+        links.add(cx, [m.limits[l].dof], zero.lt(weight[r + l]));
+    }
+    for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
+        let dofs = m.mujoco.ties[*tie].dofs.iter().copied();
+        links.add(cx, dofs, zero.lt(weight[r]));
+    }
+    for (k, class) in m.contacts.classes.iter().enumerate() {
+        let some = C::F::c(0.5).lt(contacts::count_of_class(cx, &m.contacts, k));
+        links.add(cx, class.columns.iter().map(|column| column.dof), some);
+    }
+    if !search.islands {
+        let constrained = links.any_constrained::<C>();
+        for island in &mut *links.island {
+            *island = C::F::select(constrained, zero, *island);
+        }
+    }
+}
+
+/// The islands of all dofs, while constraints are added.
+struct Links<'a, F: Num> {
+    search: &'a Search<F::Real>,
+    island: &'a mut [F],
+}
+
+impl<F: Num> Links<'_, F> {
+    /// Makes one island of the trees of these dofs, in the worlds where a constraint acts on them.
+    #[inline(always)]
+    fn add<C: Cx<F = F>>(
+        &mut self,
+        cx: &mut C,
+        dofs: impl IntoIterator<Item = usize, IntoIter: Clone>,
+        acts: MaskOf<C>,
+    ) {
+        if !cx.anywhere(acts) {
+            return;
+        }
+        let roots = dofs.into_iter().map(|dof| self.search.roots[dof]);
+        let count = F::c(self.island.len() as f64);
+        let mut least = count + count;
+        for root in roots.clone() {
+            let own = self.island[root];
+            least = least.min(F::select(own.lt(count), own, own - count));
+        }
+        let mut last = None;
+        for root in roots {
+            if last == Some(root) {
+                continue;
+            }
+            last = Some(root);
+            let from = self.island[root];
+            for island in &mut *self.island {
+                let moves = acts & is_island(*island, from);
+                *island = F::select(moves, least, *island);
+            }
+        }
+    }
+
+    /// Whether any constraint acts.
+    fn any_constrained<C: Cx<F = F>>(&self) -> MaskOf<C> {
+        let count = F::c(self.island.len() as f64);
+        let mut least = count;
+        for island in &*self.island {
+            least = least.min(*island);
+        }
+        least.lt(count)
+    }
+}
+
+/// Whether two islands are the same.
+#[inline(always)]
+pub(super) fn is_island<F: Num>(island: F, other: F) -> F::Mask {
+    (island - other).abs().lt(F::c(0.5))
+}
+
+/// The trace of the mass matrix over the dofs of an island, in MuJoCo's velocities.
+#[inline(always)]
+pub(super) fn trace<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, island: F) -> F {
+    let zero = F::c(0.0);
+    let mut sum = zero;
+    for j in 0..m.dofs.len() {
+        let own = w.mass_matrix[m.pattern.at(j, j)];
+        sum = sum + F::select(is_island(w.island[j], island), own, zero);
+    }
+    for (k, dof) in free_bodies(m) {
+        // an angular velocity e about the frame's origin moves the centre of mass by e × r, with r = -origin
+        let mut more = zero;
+        for i in 0..3 {
+            let mut axis = [zero; 3];
+            axis[i] = F::c(1.0);
+            let shift = w.origin[k].cross(Vec3(axis));
+            for row in 0..3 {
+                let cross = entry(m, w, dof + 3 + i, dof + row);
+                more = (cross + cross).fma(shift.0[row], more);
+                for column in 0..3 {
+                    let (high, low) = (row.max(column), row.min(column));
+                    let linear = entry(m, w, dof + high, dof + low);
+                    more = (linear * shift.0[row]).fma(shift.0[column], more);
+                }
+            }
+        }
+        sum = sum + F::select(is_island(w.island[dof], island), more, zero);
+    }
+    sum
+}
+
+/// An entry of the mass matrix, column ≤ row.
+#[inline(always)]
+fn entry<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, row: usize, column: usize) -> F {
+    match m.pattern.find(row, column) {
+        Some(place) => w.mass_matrix[place],
+        None => F::c(0.0),
+    }
+}
+
+/// The norm of an acceleration in MuJoCo's velocities, where it differs from 0 on one island.
+#[inline(always)]
+pub(super) fn norm<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, step: &[F]) -> F {
+    let mut sum = F::c(0.0);
+    for x in step {
+        sum = x.fma(*x, sum);
+    }
+    for (k, dof) in free_bodies(m) {
+        let [linear, angular] = halves(&step[dof..]);
+        let moved = angular.cross_add(w.origin[k], linear);
+        sum = sum + (moved.dot(moved) - linear.dot(linear));
+    }
+    sum.sqrt()
+}
+
+/// The norm of a force of dofs over an island, in MuJoCo's velocities.
+#[inline(always)]
+pub(super) fn force_norm<F: Num>(
+    m: &Constants<F::Real>,
+    w: &Workspace<F>,
+    force: &[F],
+    island: F,
+) -> F {
+    let zero = F::c(0.0);
+    let mut sum = zero;
+    for (force, own) in force.iter().zip(&w.island) {
+        let force = F::select(is_island(*own, island), *force, zero);
+        sum = force.fma(force, sum);
+    }
+    for (k, dof) in free_bodies(m) {
+        let [force, torque] = halves(&force[dof..]);
+        let moved = torque - w.origin[k].cross(force);
+        let more = moved.dot(moved) - torque.dot(torque);
+        sum = sum + F::select(is_island(w.island[dof], island), more, zero);
+    }
+    sum.sqrt()
+}
