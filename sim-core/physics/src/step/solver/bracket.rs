@@ -5,7 +5,7 @@
 //! on its side with the smaller slope. Where no end moves, rounding is reached and the middle is the answer (MuJoCo
 //! documentation, "Computation: solvers"; the details are found by experiment with MuJoCo 3.17).
 
-use super::contact_line;
+use super::contact_line::{self, Own};
 use super::rows::{Acting, Law, bounds, dry_cost, dry_friction, equality, one_sided};
 use super::ties;
 use crate::arrays::Workspace;
@@ -21,6 +21,8 @@ pub(super) struct Segment<'a, F> {
     pub params: &'a [F],
     pub w: &'a Workspace<F>,
     pub acting: Acting,
+    /// The island that the line moves.
+    pub own: Own<'a, F>,
     /// First and second derivative of ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) at the start.
     pub gauss: [F; 2],
     /// The size of the slope below which the search ends.
@@ -275,7 +277,7 @@ impl<F: Num> Segment<'_, F> {
         }
         let all = [sums.cost, sums.slope, sums.curvature, sums.size];
         let mut cells = all.map(|sum| cx.var(sum));
-        contact_line::add::<_, TURNS>(cx, &m.contacts, alpha, &mut cells);
+        contact_line::add::<_, TURNS>(cx, &m.contacts, self.own, alpha, &mut cells);
         let [cost, slope, curvature, size] = cells;
         Point {
             alpha: cx.var(alpha),

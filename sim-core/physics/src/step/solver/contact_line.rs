@@ -1,56 +1,118 @@
-//! Contacts along a line of MuJoCo's search: cost, slope and curvature at a point of it.
+//! Contacts of an island along a line of MuJoCo's search: cost, slope and curvature at a point of it.
+//!
+//! The line moves one island, so contacts of others are left alone: a pile of islands costs no more than one of their size.
 
 use super::cones::{bend_along, power};
 use super::contacts::{ContactsOf, block_of, law_at};
+use super::islands::is_island;
 use super::turning;
+use crate::constants::contact::Class;
 use crate::constants::contact::{row, turning as more};
-use crate::each;
-use crate::lane::{Cx, Num};
+use crate::lane::{Cx, MaskOf, Num};
 use crate::step::contact_rows::class_list;
+use crate::{each, when};
 
-/// Adds to `sums` the cost of all contacts at `JAR` + α `AHEAD` less that at `JAR`, then its first and second
+/// An island, by the island of each dof.
+#[derive(Clone, Copy)]
+pub(super) struct Own<'a, F> {
+    pub islands: &'a [F],
+    pub island: F,
+}
+
+impl<F: Num> Own<'_, F> {
+    /// The worlds in which a class of contacts is part of the island.
+    #[inline(always)]
+    fn has<C: Cx<F = F>>(&self, class: &Class<F::Real>) -> Option<MaskOf<C>> {
+        // contacts make one island of all dofs that move them
+        let dof = class.columns.first()?.dof;
+        Some(is_island(self.islands[dof], self.island))
+    }
+}
+
+/// Writes J `step` to `AHEAD` of the island's contacts.
+#[inline(always)]
+pub(super) fn changes<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    t: &ContactsOf<C>,
+    own: Own<'_, C::F>,
+    step: &[C::F],
+) {
+    let zero = [C::F::c(0.0); 3];
+    for (k, class) in t.classes.iter().enumerate() {
+        let Some(has) = own.has::<C>(class) else {
+            continue;
+        };
+        when!(cx, has, {
+            let list = class_list(cx, t, k);
+            each!(cx, r in list, {
+                let (mut moves, mut turns) = (zero, zero);
+                for run in &class.runs {
+                    let first = row::JACOBIAN + 3 * run.column;
+                    moves = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], moves);
+                }
+                cx.fill_all(t.memory.rows, r, row::AHEAD, moves);
+                if let Some(block) = block_of::<_, TURNS>(class) {
+                    for run in &class.runs {
+                        let first = block + more::JACOBIAN + 3 * run.column;
+                        turns = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], turns);
+                    }
+                    cx.fill_all(t.memory.rows, r, block + more::AHEAD, turns);
+                }
+            });
+        });
+    }
+}
+
+/// Adds to `sums` the cost of the island's contacts at `JAR` + α `AHEAD` less that at `JAR`, then its first and second
 /// derivative, and the size of the terms of the first.
 #[inline(always)]
 pub(super) fn add<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
+    own: Own<'_, C::F>,
     alpha: C::F,
     sums: &mut [C::V; 4],
 ) {
     for (k, class) in t.classes.iter().enumerate() {
-        let list = class_list(cx, t, k);
-        each!(cx, r in list, {
-            let terms = match block_of::<_, TURNS>(class) {
-                None => {
-                    let jar = cx.load3(t.memory.rows, r, row::JAR);
-                    let jv = cx.load3(t.memory.rows, r, row::AHEAD);
-                    let mut there = jar;
-                    for i in 0..3 {
-                        there[i] = alpha.fma(jv[i], jar[i]);
+        let Some(has) = own.has::<C>(class) else {
+            continue;
+        };
+        when!(cx, has, {
+            let list = class_list(cx, t, k);
+            each!(cx, r in list, {
+                let terms = match block_of::<_, TURNS>(class) {
+                    None => {
+                        let jar = cx.load3(t.memory.rows, r, row::JAR);
+                        let jv = cx.load3(t.memory.rows, r, row::AHEAD);
+                        let mut there = jar;
+                        for i in 0..3 {
+                            there[i] = alpha.fma(jv[i], jar[i]);
+                        }
+                        let start = law_at(cx, t, r, jar);
+                        let law = law_at(cx, t, r, there);
+                        let power = power(&law.force, jv);
+                        let bend = bend_along(&law, jv);
+                        [law.cost - start.cost, -power, bend, power.abs()]
                     }
-                    let start = law_at(cx, t, r, jar);
-                    let law = law_at(cx, t, r, there);
-                    let power = power(&law.force, jv);
-                    [law.cost - start.cost, -power, bend_along(&law, jv), power.abs()]
-                }
-                Some(block) => {
-                    let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-                    let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
-                    let mut there = jar;
-                    for i in 0..6 {
-                        there[i] = alpha.fma(jv[i], jar[i]);
+                    Some(block) => {
+                        let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+                        let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
+                        let mut there = jar;
+                        for i in 0..6 {
+                            there[i] = alpha.fma(jv[i], jar[i]);
+                        }
+                        let start = turning::law_at(cx, t, r, block, jar, None);
+                        let law = turning::law_at(cx, t, r, block, there, None);
+                        let bend = turning::dot(law.times(jv), jv);
+                        let power = turning::dot(law.force, jv);
+                        [law.cost - start.cost, -power, bend, power.abs()]
                     }
-                    let start = turning::law_at(cx, t, r, block, jar, None);
-                    let law = turning::law_at(cx, t, r, block, there, None);
-                    let bend = turning::dot(law.times(jv), jv);
-                    let power = turning::dot(law.force, jv);
-                    [law.cost - start.cost, -power, bend, power.abs()]
+                };
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    let total = cx.get(sum) + cx.only(term);
+                    cx.put(sum, total);
                 }
-            };
-            for (sum, term) in sums.iter_mut().zip(terms) {
-                let total = cx.get(sum) + cx.only(term);
-                cx.put(sum, total);
-            }
+            });
         });
     }
 }

@@ -163,35 +163,20 @@ pub(super) fn residual<C: Cx, const TURNS: bool>(
     a: &[C::F],
     place: usize,
 ) {
-    products::<C, TURNS, true>(cx, t, a, place);
-}
-
-/// Writes J a of every contact, `RELATIVE` to aref, to `place` of its row.
-#[inline(always)]
-pub(super) fn products<C: Cx, const TURNS: bool, const RELATIVE: bool>(
-    cx: &mut C,
-    t: &ContactsOf<C>,
-    a: &[C::F],
-    place: usize,
-) {
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             // columns that follow each other, in dofs too, are one run
-            let mut jar = [C::F::c(0.0); 3];
-            if RELATIVE {
-                jar = cx.load3(t.memory.rows, r, row::AREF).map(|x| -x);
-            }
+            let [x, y, z] = cx.load3(t.memory.rows, r, row::AREF);
+            let mut jar = [-x, -y, -z];
             for run in &class.runs {
                 let first = row::JACOBIAN + 3 * run.column;
                 jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
             }
             cx.fill_all(t.memory.rows, r, place, jar);
             if let Some(block) = block_of::<_, TURNS>(class) {
-                let mut jar = [C::F::c(0.0); 3];
-                if RELATIVE {
-                    jar = cx.load3(t.memory.rows, r, block + more::AREF).map(|x| -x);
-                }
+                let [x, y, z] = cx.load3(t.memory.rows, r, block + more::AREF);
+                let mut jar = [-x, -y, -z];
                 for run in &class.runs {
                     let first = block + more::JACOBIAN + 3 * run.column;
                     jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);

@@ -10,10 +10,10 @@
 //! steps of all.
 
 use super::bracket::{Segment, search};
+use super::contact_line::{self, Own};
 use super::islands::{find, force_norm, is_island, norm, trace};
 use super::rows::{Acting, Jacobian, residual};
-use super::{constraint_forces, contacts, minimize_model, model_cost};
-use crate::constants::contact::row;
+use super::{constraint_forces, minimize_model, model_cost};
 use crate::constants::mujoco::Search;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::factor::multiply;
@@ -97,8 +97,8 @@ fn step<C: Cx, const TURNS: bool>(
     let island = C::F::c(first as f64);
     let mut descent = zero;
     for j in 0..m.dofs.len() {
-        let own = is_island(w.island[j], island);
-        w.step[j] = C::F::select(own, w.minimum[j] - w.start[j], zero);
+        let moves = is_island(w.island[j], island);
+        w.step[j] = C::F::select(moves, w.minimum[j] - w.start[j], zero);
         descent = w.missing[j].fnma(w.step[j], descent);
     }
     let trace = trace(m, w, island);
@@ -121,12 +121,17 @@ fn step<C: Cx, const TURNS: bool>(
         w.row_force.fill(zero);
         let jacobian = Jacobian::new(problem.acting, &w.limit_side, &w.row_jacobian);
         residual(m, jacobian, &w.row_force, &w.step, &mut w.jar_minimum);
-        contacts::products::<_, TURNS, false>(cx, &m.contacts, &w.step, row::AHEAD);
+        let own = Own {
+            islands: &w.island,
+            island,
+        };
+        contact_line::changes::<_, TURNS>(cx, &m.contacts, own, &w.step);
         let bound = tolerance * C::F::k(problem.search.ls_tolerance) * length * trace;
         let line = Segment {
             params: &b.params,
             w,
             acting: problem.acting,
+            own,
             gauss,
             bound,
         };
