@@ -189,7 +189,7 @@ tl.Scene(gravity=-9.81)                                   | gravity is -9\.81; g
 tl.Scene(dt="1ms")                                        | dt is '1ms'; give a number
 tl.Scene(timestep=0.01)                                   | `timestep`; did you mean `dt`
 mine.add_box(half_extents=0.1)                            | half_extents is 0\.1; give 3 numbers
-mine.add_box(size=(1, 1, 1))                              | `size`; did you mean `half_extents`
+mine.add_box(size=(1, 1, 1))                              | `size`; `half_extents` are half of each edge
 mine.add_box(half_extents=(1, 1, 1), body="cub")          | body is 'cub'.*there are: `cube`
 mine.add_ground(pos=(0, 0, 1))                            | no argument `pos`.*add_ground\(\*, z=…
 mine.robots["arm"].order(["fr3_joint1"])                  | order: names lacks

@@ -102,6 +102,14 @@ def test_messages_name_the_call_the_culprit_and_the_cure(world):
         (lambda: world.sim.reset(env_ids=[0]), "did you mean `mask`?"),
         (lambda: world.sim.write(qpos=1), "Sim.write: there is no argument `qpos`; did you mean `joint_q`?"),
         (lambda: world.sim.close(True), "Sim.close: it takes no argument and got 1; call close()"),
+        (
+            lambda: scene.randomize(body_mass=tl.Uniform(0.8, 1.2)),
+            'there is no argument `body_mass`; it is a parameter: randomize(params={"body_mass": ',
+        ),
+        (lambda: scene.add_box(size=(1, 1, 1)), "`half_extents` are half of each edge"),
+        (lambda: scene.add_capsule(radius=0.1, length=1), "`half_height` is half the length of its straight part"),
+        (lambda: scene.add_ground(pos=(0, 0, 1)), "there is no argument `pos`; `z` is its height"),
+        (lambda: world.sim.reset(worlds=[0]), "`mask` has True for the worlds meant"),
         (lambda: tl.launch(scene, world=4), "launch: there is no argument `world`; did you mean `worlds`"),
         (lambda: tl.launch(scene, num_envs=4), "did you mean `worlds`?"),
         (
@@ -119,7 +127,6 @@ def test_messages_name_the_call_the_culprit_and_the_cure(world):
         (lambda: scene.add_ground(pos=(0, 0, 1)), "Scene.add_ground: there is no argument `pos`"),
         (lambda: scene.add_cube(size=1), "Scene.add_cube: there is no argument `size`"),
         (lambda: scene.add_box(half_extent=(1, 1, 1)), "did you mean `half_extents`?"),
-        (lambda: scene.add_box(size=(1, 1, 1)), "did you mean `half_extents`?"),
         (lambda: scene.add_sphere(radius=1, friction=1), "did you mean `mu`?"),
         (lambda: tl.Uniform(0.0), "Uniform: `high` is missing"),
         (tl.Snapshot.load, "Snapshot.load: `path` is missing"),

@@ -161,6 +161,8 @@ class Params:
         """
         self._varying(name)
         shape = self._shape(name)
+        if isinstance(value, Mapping):
+            raise CommandRefused(f"params.{name} is {value!r:.80}; give an array, one value for each of {_order(name)}")
         given = real_numbers(name, value)
         if given.shape not in (shape, shape[1:], ()):
             raise CommandRefused(
@@ -189,3 +191,18 @@ class Params:
 
     def __repr__(self) -> str:
         return f"Params({', '.join(self.names) or 'none varies'})"
+
+
+def _order(name: str) -> str:
+    """Return where the names stand in whose order a parameter has its values."""
+    kind = name.partition("_")[0]
+    orders = {
+        "body": "sim.body_names",
+        "shape": "sim.shape_names",
+        "joint": "sim.dof_names",
+        "actuator": "sim.actuator_names",
+        "contact": "sim.contact_sensor_names",
+        "gravity": "x, y and z",
+        "command": "the worlds",
+    }
+    return orders.get(kind, "sim.site_names")

@@ -11,12 +11,15 @@ from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
 from tightloop.scene_sensors import SceneSensors
-from tightloop.signatures import checked_calls
+from tightloop.signatures import add_hints, checked_calls
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: Parts as they are called elsewhere.
 _PARTS_MEANT = {"rx": ["roll"], "ry": ["pitch"], "rz": ["yaw"], "theta": ["yaw"], "heading": ["yaw"]}
+
+_PARAM = 'it is a parameter: randomize(params={{"{}": {{…: tightloop.Uniform(…)}}}})'
+add_hints("randomize", dict.fromkeys(_core.param_names(), _PARAM))
 
 Offsets = Mapping[str, Distribution]
 BodyOffsets = Mapping[str, Mapping[str, Distribution]]

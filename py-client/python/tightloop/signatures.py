@@ -54,12 +54,19 @@ def unknown_argument(call: str, name: str, accepted: Sequence[str]) -> Signature
     )
 
 
+def add_hints(call: str, hints: Mapping[str, str]) -> None:
+    """Say what to do instead of giving arguments that a call does not take; ``{}`` stands for the argument."""
+    _HINTS.setdefault(call, {}).update(hints)
+
+
 _FURTHER = "_further_arguments"
 _NO_WINDOW = "a simulation has no window: `sim.view()` opens a viewer, and `sim.picture()` draws"
 _OF_LAUNCH = "it is an argument of `tightloop.launch`"
 _OF_SCENE = "it is an argument of `tightloop.Scene`"
 _OF_ROBOT = "set it on the robot that the call returns, as in `robot.{} = …`"
 _SEED = "`sim.reset(seed=…)` sets it after the launch"
+_HALF = "`half_height` is half the length of its straight part"
+_HALVES = "`half_extents` are half of each edge"
 #: What to do instead of giving arguments that calls of other libraries have, by the call's name.
 _HINTS = {
     "add_urdf": {
@@ -84,6 +91,10 @@ _HINTS = {
         "qpos": _OF_ROBOT.format("joint_q"),
         "stiffness": _OF_ROBOT.format("joint_target_ke"),
     },
+    "add_box": dict.fromkeys(("size", "extents", "dimensions"), _HALVES),
+    "add_capsule": dict.fromkeys(("length", "height"), _HALF),
+    "add_cylinder": dict.fromkeys(("length", "height"), "`half_height` is half its length"),
+    "add_ground": dict.fromkeys(("pos", "height"), "`z` is its height"),
     "launch": {
         "dt": _OF_SCENE,
         "gravity": _OF_SCENE,
@@ -97,6 +108,7 @@ _HINTS = {
         "timestep": f"`dt` {_OF_SCENE.removeprefix('it ')}",
         "viewer": _NO_WINDOW,
     },
+    **{call: dict.fromkeys(("worlds", "world"), "`mask` has True for the worlds meant") for call in ("reset", "write")},
     "Scene": {
         "device": _OF_LAUNCH,
         "headless": f"leave it out: {_NO_WINDOW}",
