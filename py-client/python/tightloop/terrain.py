@@ -11,7 +11,7 @@ arguments, ``seed`` included.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -19,8 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import checks
+from tightloop.attributes import suggestion
 from tightloop.errors import SceneError
+from tightloop.height_fields import SAMPLES_MAX
 from tightloop.shapes import Shape, Surface
+from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -97,36 +100,43 @@ class Terrain:
         return scene.add_hfield(self.elevation, size=self.size, base=base, pos=pos, name=name, **surface)
 
 
+@checked_calls
 def flat(*, tile: float = 8.0, cell: float = 0.1) -> Terrain:
     """Return level ground."""
     return _single("flat", 0.0, tile, cell, 0)
 
 
+@checked_calls
 def rough(*, amplitude: float = 0.05, tile: float = 8.0, cell: float = 0.1, seed: int = 0) -> Terrain:
     """Return random ground: uniform elevations of at most ``amplitude`` [m], smoothed over two cells."""
     return _single("rough", amplitude, tile, cell, seed)
 
 
+@checked_calls
 def slopes(*, slope: float = 0.3, tile: float = 8.0, cell: float = 0.1, seed: int = 0) -> Terrain:
     """Return a pyramid, or a pit, with sides of this ``slope`` [–] and a level middle."""
     return _single("slopes", slope, tile, cell, seed)
 
 
+@checked_calls
 def stairs(*, step: float = 0.1, tile: float = 8.0, cell: float = 0.1, seed: int = 0) -> Terrain:
     """Return square stairs up or down to a level middle, with steps of this height [m] that are 0.3 m deep."""
     return _single("stairs", step, tile, cell, seed)
 
 
+@checked_calls
 def steps(*, height: float = 0.1, tile: float = 8.0, cell: float = 0.1, seed: int = 0) -> Terrain:
     """Return discrete obstacles: blocks and pits of at most this ``height`` [m] on level ground."""
     return _single("steps", height, tile, cell, seed)
 
 
+@checked_calls
 def stones(*, gap: float = 0.2, tile: float = 8.0, cell: float = 0.1, seed: int = 0) -> Terrain:
     """Return stepping stones of about 0.5 m with gaps of this width [m] between them, 0.5 m deep."""
     return _single("stones", gap, tile, cell, seed)
 
 
+@checked_calls
 def mixed(
     kinds: Sequence[str] = KINDS,
     *,
@@ -159,10 +169,12 @@ def mixed(
         raise SceneError(f"terrain: kinds is {kinds!r:.80}; give a sequence of at least one of {', '.join(KINDS)}")
     for kind in kinds:
         checks.choice("terrain: kind", kind, KINDS)
+    seed = checks.integer("terrain: seed", seed, least=-(2**63))
     samples, step = _cells(tile, cell)
-    sizes = _HARDEST | (hardest or {})
+    sizes = _HARDEST | _sizes(hardest)
     around = round(width / step)
     rows, columns = levels * samples + 2 * around + 1, len(kinds) * samples + 2 * around + 1
+    _check_count(rows, columns)
     elevation = np.zeros((rows, columns))
     starts = np.zeros((levels, len(kinds), 3))
     for level in range(levels):
@@ -199,11 +211,35 @@ def _cells(tile: float, cell: float) -> tuple[int, float]:
     """Cells along a tile, an even number, and their size."""
     tile = checks.number("terrain: tile", tile, least=4.0 * _MIDDLE)
     cell = checks.number("terrain: cell", cell, above=0.0)
-    return 2 * max(8, round(0.5 * tile / cell)), tile / (2 * max(8, round(0.5 * tile / cell)))
+    cells = 2 * max(8, round(0.5 * tile / cell)) if tile / cell < SAMPLES_MAX else SAMPLES_MAX
+    _check_count(cells, cells)
+    return cells, tile / cells
+
+
+def _check_count(rows: int, columns: int) -> None:
+    """Refuse more elevations than a height field may have, before there is memory for them."""
+    if rows * columns > SAMPLES_MAX:
+        raise SceneError(
+            f"terrain: {rows} by {columns} elevations are more than {SAMPLES_MAX}; give a larger cell, a smaller tile "
+            "or fewer levels"
+        )
+
+
+def _sizes(hardest: Mapping[str, float] | None) -> dict[str, float]:
+    """Return the sizes of the last level that are given, checked."""
+    if hardest is None:
+        return {}
+    if not isinstance(hardest, Mapping):
+        raise SceneError(f"terrain: hardest is {hardest!r:.80}; give a dict of sizes by kind")
+    for kind in hardest:
+        if kind not in KINDS:
+            raise SceneError(f"terrain: hardest has {kind!r}, and there is no such kind; {suggestion(kind, KINDS)}")
+    return {kind: checks.number(f"terrain: hardest {kind}", size, least=0.0) for kind, size in hardest.items()}
 
 
 def _single(kind: str, size: float, tile: float, cell: float, seed: int) -> Terrain:
     size = checks.number(f"terrain: size of {kind}", size, least=0.0)
+    seed = checks.integer("terrain: seed", seed, least=-(2**63))
     samples, step = _cells(tile, cell)
     own = _tile(kind, size, samples, step, (seed, 0, 0))
     start = np.array([[[0.0, 0.0, own[samples // 2, samples // 2]]]])
