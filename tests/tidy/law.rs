@@ -91,6 +91,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "joint_kind",
             "error",
             "files",
+            "contents",
             "cache_files",
             "pose",
             "value_checks",

@@ -21,6 +21,7 @@
 
 mod cache_files;
 mod compile;
+mod contents;
 mod description;
 mod distribution;
 mod error;

@@ -6,5 +6,6 @@ mod hulls;
 mod kept;
 mod looks;
 mod mass;
+mod oddities;
 mod refused;
 mod thin;

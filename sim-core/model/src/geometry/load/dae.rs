@@ -232,6 +232,12 @@ fn transform(node: Node) -> Result<Affine, String> {
         ("rotate", &[x, y, z, degrees]) => rotation(unit([x, y, z]), degrees.to_radians()),
         ("matrix" | "bind_shape_matrix", values) if values.len() == 16 => {
             let row = |row: usize| [0, 1, 2, 3].map(|column| values[4 * row + column]);
+            if row(3) != [0.0, 0.0, 0.0, 1.0] {
+                return Err(format!(
+                    "the last row of a <matrix> is {:?}; it must be 0 0 0 1, export it again",
+                    row(3)
+                ));
+            }
             Affine([row(0), row(1), row(2)])
         }
         (name, values) => {

@@ -122,6 +122,12 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             // a polygon with holes has its outline in <p> within <ph>
             let list = list.child("p").unwrap_or(list);
             let indices = numbers::<u32>(Some(list))?;
+            if indices.len() % stride != 0 {
+                let found = indices.len();
+                return Err(format!(
+                    "a <p> has {found} indices, {stride} a corner; it was cut short, export it again"
+                ));
+            }
             let corners: Vec<u32> = indices
                 .iter()
                 .skip(vertex_offset)
@@ -222,9 +228,13 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
                 "positions come in steps of {stride} numbers, not 3; export it again"
             ));
         }
+        let columns = columns(source, stride);
         let mut points: Vec<[f64; 3]> = values
             .chunks(stride)
-            .filter_map(|point| point.first_chunk().copied())
+            .filter_map(|point| {
+                let [x, y, z] = columns.map(|column| point.get(column).copied());
+                Some([x?, y?, z?])
+            })
             .collect();
         if let Some(count) = count {
             if count > points.len() {
@@ -266,6 +276,26 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
     }
 }
 
+/// The places of x, y and z in a row: those of an accessor's parameters with a name, since it steps over the others.
+fn columns(source: Node, stride: usize) -> [usize; 3] {
+    let accessor = source
+        .child("technique_common")
+        .and_then(|common| common.child("accessor"));
+    let params = accessor
+        .into_iter()
+        .flat_map(|accessor| accessor.children());
+    let params = params.filter(|param| param.has_tag_name_of("param"));
+    let mut named = params
+        .enumerate()
+        .filter(|(_, param)| param.attribute("name").is_some_and(|name| !name.is_empty()))
+        .map(|(at, _)| at)
+        .filter(|&at| at < stride);
+    match [named.next(), named.next(), named.next()] {
+        [Some(x), Some(y), Some(z)] => [x, y, z],
+        _ => [0, 1, 2],
+    }
+}
+
 /// Which number of each corner's is an input's index.
 fn offset(input: &Node) -> u16 {
     let text = input.attribute("offset");
@@ -279,6 +309,11 @@ fn places(
     counts: &mut impl Iterator<Item = usize>,
 ) -> Result<Vec<[usize; 3]>, String> {
     Ok(match kind {
+        "triangles" if corners % 3 != 0 => {
+            return Err(format!(
+                "a <p> of <triangles> has {corners} corners, 3 a triangle; it was cut short, export it again"
+            ));
+        }
         "triangles" => separate(corners).collect(),
         "polylist" => {
             let (mut places, mut first) = (Vec::new(), 0);
@@ -290,6 +325,12 @@ fn places(
                 }
                 places.extend(fan(first, count));
                 first += count;
+            }
+            if first < corners {
+                let over = corners - first;
+                return Err(format!(
+                    "<vcount> leaves {over} corners of <p> over; export it again"
+                ));
             }
             places
         }

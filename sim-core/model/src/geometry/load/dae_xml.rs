@@ -42,8 +42,13 @@ pub(super) fn numbers<T: std::str::FromStr>(node: Option<Node>) -> Result<Vec<T>
     let Some(node) = node else {
         return Ok(Vec::new());
     };
-    let text = node.text().unwrap_or_default();
-    text.split_ascii_whitespace()
+    // comments part a text into several
+    let texts = node.children().filter_map(|part| match part.is_text() {
+        true => part.text(),
+        false => None,
+    });
+    texts
+        .flat_map(str::split_ascii_whitespace)
         .map(|word| {
             word.parse().map_err(|_| {
                 let name = node.tag_name().name();

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use gltf::mesh::{Mode, Semantic};
+use gltf::scene::Transform;
 use gltf::{Document, Gltf, Node};
 
 use super::gltf_material::{self, Images};
@@ -19,15 +20,29 @@ use super::{Limits, RawMesh, Run};
 
 /// Deepest nesting of scene nodes.
 const DEPTH_MAX: usize = 100;
+/// Places of further copies of a node's mesh.
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// Most scene nodes visited: those that refer to one another can stand for billions.
 const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
-    let Gltf { document, blob } = Gltf::from_slice(unmarked(bytes)?)
-        .map_err(|error| format!("is not glTF 2.0: {error}; export it again"))?;
-    if let Some(extension) = document.extensions_required().next() {
+    let bytes = unmarked(bytes)?;
+    let Gltf { document, blob } = Gltf::from_slice(bytes).map_err(|error| {
+        // the check of the whole file would call an extension that is not read an error of the file
+        match Gltf::from_slice_without_validation(bytes).map(|gltf| needed(&gltf.document)) {
+            Ok(Some(needed)) => needed,
+            _ => format!("is not glTF 2.0: {error}; export it again"),
+        }
+    })?;
+    if let Some(needed) = needed(&document) {
+        return Err(needed);
+    }
+    if document
+        .extensions_used()
+        .any(|extension| extension == INSTANCING)
+    {
         return Err(format!(
-            "it needs the extension {extension}; export it without"
+            "it repeats meshes by the extension {INSTANCING}; export a node for each"
         ));
     }
     let mut scene = Scene {
@@ -41,6 +56,14 @@ pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMes
     scene.whole(&document)?;
     scene.mesh.beside = scene.buffers.beside;
     Ok(scene.mesh)
+}
+
+/// What is wrong with a file that cannot be read without some extension.
+fn needed(document: &Document) -> Option<String> {
+    let extension = document.extensions_required().next()?;
+    Some(format!(
+        "it needs the extension {extension}; export it without"
+    ))
 }
 
 struct Scene<'a> {
@@ -75,11 +98,24 @@ impl Scene<'_> {
                 "its nodes nest deeper than {DEPTH_MAX}, or stand for more than {VISITS_MAX}; simplify the scene"
             ));
         }
-        let columns = node.transform().matrix();
+        let columns = unit(node.transform())?.matrix();
         let row = |row: usize| [0, 1, 2, 3].map(|column| f64::from(columns[column][row]));
         let frame = frame.after(Affine([row(0), row(1), row(2)]));
         if let Some(mesh) = node.mesh() {
-            self.mesh(&mesh, frame)?;
+            let blended = node.weights().or(mesh.weights()).unwrap_or_default();
+            if blended.iter().any(|&weight| weight != 0.0) {
+                return Err("morph targets give it its shape; bake them into its mesh".to_owned());
+            }
+            // the joints of a skin place it; where it was bound to them, they leave it as it lies in the file
+            if node.skin().is_some() {
+                let note = "has a skin, and is taken as it was bound to its joints";
+                if !self.mesh.notes.iter().any(|known| known == note) {
+                    self.mesh.notes.push(note.to_owned());
+                }
+                self.mesh(&mesh, Affine::Y_UP)?;
+            } else {
+                self.mesh(&mesh, frame)?;
+            }
         }
         node.children()
             .try_for_each(|child| self.node(&child, frame, depth + 1))
@@ -147,4 +183,34 @@ impl Scene<'_> {
         }
         Ok(raw)
     }
+}
+
+/// A transformation with a rotation of unit length, which some exporters round away from it.
+fn unit(transform: Transform) -> Result<Transform, String> {
+    let Transform::Decomposed {
+        translation,
+        rotation,
+        scale,
+    } = transform
+    else {
+        return Ok(transform);
+    };
+    let length = rotation
+        .iter()
+        .map(|&part| f64::from(part) * f64::from(part))
+        .sum::<f64>()
+        .sqrt();
+    if length == 0.0 {
+        return Err("the rotation of a node is 0 0 0 0; export it again".to_owned());
+    }
+    // one that is a unit to the roundings of a text stays as it was written
+    let rotation = match (length - 1.0).abs() < 1e-6 {
+        true => rotation,
+        false => rotation.map(|part| (f64::from(part) / length) as f32),
+    };
+    Ok(Transform::Decomposed {
+        translation,
+        rotation,
+        scale,
+    })
 }

@@ -26,6 +26,7 @@ use std::path::Path;
 
 use super::trimesh::TriMesh;
 use crate::cache_files::digest;
+use crate::contents;
 use crate::files::{self, FileError};
 pub(super) use raw::{Beside, Material, RawMesh, Run, Uv};
 
@@ -111,6 +112,9 @@ impl<'a> Source<'a> {
         if bytes.is_empty() {
             return Err("it is empty; export it again".to_owned());
         }
+        if let Some(other) = contents::neither_robot_nor_mesh(&bytes) {
+            return Err(other.to_owned());
+        }
         Ok(Source {
             path,
             format,
@@ -158,10 +162,12 @@ impl<'a> Source<'a> {
             Format::Obj => obj::read(&self.bytes, folder, limits),
             Format::Dae => dae::read(&self.bytes, folder, limits),
             Format::Gltf => gltf::read(&self.bytes, folder, limits),
-        }?;
-        if raw.triangles.is_empty() {
-            return Err("it holds no triangles; export a surface".to_owned());
-        }
+        };
+        let raw = raw.and_then(|raw| match raw.triangles.is_empty() {
+            true => Err("it holds no triangles; export a surface".to_owned()),
+            false => Ok(raw),
+        });
+        let raw = raw.map_err(|reason| self.renamed().unwrap_or(reason))?;
         if let Some(far) = raw
             .vertices
             .iter()
@@ -173,6 +179,18 @@ impl<'a> Source<'a> {
             ));
         }
         Ok(raw)
+    }
+}
+
+impl Source<'_> {
+    /// What is wrong with a file of another format under this one's name.
+    fn renamed(&self) -> Option<String> {
+        let (format, ending) = contents::mesh_format(&self.bytes)?;
+        match format_of(Path::new(&format!("mesh{ending}"))) {
+            Ok(own) if own as u8 == self.format as u8 => None,
+            Ok(_) => Some(format!("it is {format}; end its name in {ending}")),
+            Err(reason) => Some(format!("it is {format}: {reason}")),
+        }
     }
 }
 

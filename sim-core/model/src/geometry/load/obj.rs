@@ -33,10 +33,14 @@ pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMes
         match keyword {
             Some("v") => {
                 let mut next = || words.next()?.parse::<f64>().ok();
-                // what may follow is a weight or a colour
                 let (Some(x), Some(y), Some(z)) = (next(), next(), next()) else {
                     return Err(fault(index, "is not `v` and three numbers"));
                 };
+                // a weight or a colour may follow
+                if let Some(word) = words.find(|word| word.parse::<f64>().is_err()) {
+                    let problem = format!("has `{word}` behind its vertex");
+                    return Err(fault(index, &problem));
+                }
                 mesh.vertices.push([x, y, z]);
             }
             Some("f" | "fo") => {

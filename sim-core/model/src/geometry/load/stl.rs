@@ -31,6 +31,11 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
             "its header tells of {claimed} triangles, but it holds {held}; it was cut short, copy or export it again"
         ));
     }
+    if claimed < held {
+        return Err(format!(
+            "its header tells of {claimed} triangles, but it holds {held}; export it again"
+        ));
+    }
     limits.triangles(claimed)?;
     let mut mesh = RawMesh::default();
     for record in bytes[HEADER..].chunks_exact(RECORD).take(claimed) {
@@ -64,7 +69,10 @@ fn read_text(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
     for (line, words) in (1..).zip(lines(&text)) {
         let mut words = words.split_ascii_whitespace();
         let Some(word) = words.next() else { continue };
-        ended = word.eq_ignore_ascii_case("endsolid");
+        // some write `end solid`, and notes below it
+        let next = words.clone().next().unwrap_or_default();
+        ended |= word.eq_ignore_ascii_case("endsolid")
+            || word.eq_ignore_ascii_case("end") && next.eq_ignore_ascii_case("solid");
         if word.eq_ignore_ascii_case("vertex") {
             let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
             let [x, y, z] = numbers[..] else {
@@ -73,6 +81,7 @@ fn read_text(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
                 ));
             };
             corners.push([x, y, z]);
+            ended = false;
         } else if word.eq_ignore_ascii_case("endloop") {
             let [a, b, c] = corners[..] else {
                 let found = corners.len();

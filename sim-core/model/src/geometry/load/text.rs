@@ -65,8 +65,9 @@ pub(super) fn is_wide(bytes: &[u8]) -> bool {
 /// Files that were joined have byte order marks inside, and editors leave spaces without width: at the start of a line they
 /// would hide its keyword.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = &str> {
-    let end = if text.contains('\n') { '\n' } else { '\r' };
+    // files that were joined have lines of several systems
+    let of_unix = text.split('\n');
+    let lines = of_unix.flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'));
     let hidden = |c: char| matches!(c, '\u{feff}' | '\u{200b}' | '\u{2060}') || c.is_control();
-    text.split(end)
-        .map(move |line| line.trim_start_matches(hidden))
+    lines.map(move |line| line.trim_start_matches(hidden))
 }
