@@ -124,8 +124,9 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         if (length - 1.0).abs() > 1e-6 {
             self.notes.push(format!(
-                "joint `{}`: axis of length {length} is scaled to 1",
-                joint.name
+                "joint `{}`: axis of length {} is scaled to 1",
+                joint.name,
+                written(length)
             ));
         }
         Ok(scaled.map(|part| part / scaled_length))
@@ -270,5 +271,13 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         start_followers(joints);
         Ok(())
+    }
+}
+
+/// A number in as few digits as are readable.
+fn written(number: f64) -> String {
+    match (1e-3..1e6).contains(&number) {
+        true => number.to_string(),
+        false => format!("{number:e}"),
     }
 }

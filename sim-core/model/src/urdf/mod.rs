@@ -18,6 +18,7 @@ mod links;
 mod load;
 mod markup;
 mod mesh;
+mod mistakes;
 mod options;
 mod reader;
 mod scan;

@@ -12,7 +12,8 @@ use roxmltree::{Document, Node, NodeId};
 
 use super::element::Element;
 use super::ignored::Ignored;
-use super::table::{Count, GEOMETRY, Need, PLACES, ROBOT, Tag};
+use super::mistakes::{self, Mistakes};
+use super::table::{Count, GEOMETRY, Kind, Need, PLACES, ROBOT, Tag};
 use super::value;
 use super::xacro::{Xacro, is_xacro};
 pub(super) use super::xml::{children, has};
@@ -44,6 +45,8 @@ pub(super) struct Scan<'a, 'input> {
     angles: HashMap<NodeId, [f64; 3]>,
     xacro: Xacro<'a>,
     ignored: Ignored,
+    /// What was probably not meant.
+    pub mistakes: Mistakes,
 }
 
 impl<'a, 'input> Scan<'a, 'input> {
@@ -65,6 +68,7 @@ impl<'a, 'input> Scan<'a, 'input> {
             angles: HashMap::new(),
             xacro: Xacro::new(document),
             ignored: Ignored::default(),
+            mistakes: Mistakes::default(),
         };
         if root.tag_name().name() != ROBOT.name {
             let cure = match root.tag_name().name() {
@@ -124,7 +128,7 @@ impl<'a, 'input> Scan<'a, 'input> {
                 .iter()
                 .position(|(known, _)| own && known.name == child.tag_name().name());
             let Some(place) = known else {
-                self.unknown(node, child, own)?;
+                self.unknown(node, child, own, tag)?;
                 continue;
             };
             let (known, count) = tag.children[place];
@@ -204,6 +208,7 @@ impl<'a, 'input> Scan<'a, 'input> {
         parent: Node<'a, 'input>,
         child: Node<'a, 'input>,
         own: bool,
+        tag: &'static Tag,
     ) -> Result<(), ModelError> {
         let name = child.tag_name().name();
         if !own && is_xacro(child) {
@@ -212,11 +217,24 @@ impl<'a, 'input> Scan<'a, 'input> {
             self.ignore(child, what);
             return Ok(());
         }
+        if name == "include" && !own {
+            let reason = "is not followed; write what it includes into this file";
+            return Err(self.fault(child, reason.to_owned()));
+        }
         let place = PLACES
             .iter()
             .find(|(known, _)| known.eq_ignore_ascii_case(name));
         let Some((known, place)) = place.filter(|_| own) else {
-            self.ignore(child, format!("<{}>", name_of(child)));
+            let what = format!("<{}>", name_of(child));
+            let absent = tag.children.iter().filter(|(known, count)| {
+                *count == Count::Any || children(parent, known.name).next().is_none()
+            });
+            let absent: Vec<&str> = absent.map(|(known, _)| known.name).collect();
+            if let Some(meant) = mistakes::meant(tag.name, name, &absent).filter(|_| own) {
+                let line = self.line(child);
+                self.mistakes.misspelt(&what, line, &format!("<{meant}>"));
+            }
+            self.ignore(child, what);
             return Ok(());
         };
         let parent = name_of(parent);
@@ -243,7 +261,19 @@ impl<'a, 'input> Scan<'a, 'input> {
                     .any(|known| known.name == attribute.name());
             if !known {
                 let name = short(attribute.name());
-                self.ignore(node, format!("attribute `{name}` of <{}>", tag.name));
+                let what = format!("attribute `{name}` of <{}>", tag.name);
+                let absent = tag
+                    .attributes
+                    .iter()
+                    .map(|known| known.name)
+                    .filter(|known| !node.has_attribute(*known));
+                let absent: Vec<&str> = absent.collect();
+                let meant = mistakes::meant(tag.name, &name, &absent);
+                if let Some(meant) = meant.filter(|_| attribute.namespace().is_none()) {
+                    let line = self.line(node);
+                    self.mistakes.misspelt(&what, line, &format!("`{meant}`"));
+                }
+                self.ignore(node, what);
             }
         }
         for known in tag.attributes {
@@ -257,6 +287,11 @@ impl<'a, 'input> Scan<'a, 'input> {
                             node,
                             format!("comma in attribute `{name}` of <{}>", tag.name),
                         );
+                    }
+                    if known.kind == Kind::Angles {
+                        let [roll, pitch, yaw, _] = value.numbers;
+                        let (of, line) = (describe(node), self.line(node));
+                        self.mistakes.angles(&of, line, [roll, pitch, yaw]);
                     }
                     if known.name == "quat_xyzw" {
                         self.quaternion(node, value.numbers)?;
@@ -317,9 +352,9 @@ impl<'a, 'input> Scan<'a, 'input> {
         self.ignored.notes(self.document.input_text())
     }
 
-    /// What of xacro changes the robot.
+    /// What of xacro changes the robot, and what was probably not meant.
     pub fn warnings(&self) -> Vec<String> {
-        self.xacro.warnings()
+        [self.xacro.warnings(), self.mistakes.warnings()].concat()
     }
 
     /// An error about one element.

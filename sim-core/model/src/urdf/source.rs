@@ -7,7 +7,8 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use super::markup::{ATTRIBUTES_OF_ONE_MAX, Markup, starts_with};
+use super::markup::{ATTRIBUTES_OF_ONE_MAX, Markup};
+use crate::contents;
 use crate::error::ModelError;
 use crate::files::{self, FileError};
 
@@ -19,6 +20,8 @@ const TAGS_MAX: usize = 250_000;
 const ATTRIBUTES_MAX: usize = 300_000;
 /// Declarations of namespaces: the parser hands each down to all elements within.
 const NAMESPACES_MAX: usize = 64;
+/// What is said of other texts, such as JSON.
+const NO_XML: &str = "this is no XML; a URDF file begins with `<`, and holds one <robot>";
 
 /// The text of a file.
 ///
@@ -29,6 +32,14 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<String, Model
         FileError::TooLarge { .. } => size_limit(path),
         error => error.of(path),
     })?;
+    if let Some(other) = contents::neither_robot_nor_mesh(&bytes) {
+        return Err(ModelError::Xml {
+            path: path.to_owned(),
+            line: 1,
+            column: 1,
+            reason: other.to_owned(),
+        });
+    }
     decode(bytes, path, notes)
 }
 
@@ -88,7 +99,7 @@ pub(super) fn prepare<'a>(
     if text.len() > FILE_MAX {
         return Err(size_limit(path));
     }
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = text.trim_start_matches(['\u{feff}', '\u{200b}', '\u{2060}']);
     let text = text.trim_end_matches(|c: char| c == '\0' || c.is_ascii_whitespace());
     let refuse = |at: usize, reason: String| ModelError::Xml {
         path: path.to_owned(),
@@ -102,17 +113,15 @@ pub(super) fn prepare<'a>(
             "the file is empty; a URDF file holds one <robot>".to_owned(),
         ));
     }
-    if text.starts_with("version https://git-lfs") {
-        let reason = "this is a pointer to a file in Git LFS, not the file; run `git lfs pull`";
-        return Err(refuse(0, reason.to_owned()));
+    if let Some(other) = contents::neither_robot_nor_mesh(text.as_bytes()) {
+        return Err(refuse(0, other.to_owned()));
+    }
+    if !text.trim_start().starts_with('<') {
+        return Err(refuse(0, NO_XML.to_owned()));
     }
     let markup = Markup::of(text);
     if let Some(at) = markup.document_type {
-        let reason = if starts_with(&text[at..], "<!doctype html") {
-            "this is a web page, not a URDF file; download the raw file"
-        } else {
-            "<!DOCTYPE> is refused, since entities can expand without bound; delete it, and write out what its entities stand for"
-        };
+        let reason = "<!DOCTYPE> is refused, since entities can expand without bound; delete it, and write out what its entities stand for";
         return Err(refuse(at, reason.to_owned()));
     }
     if markup.tags > TAGS_MAX {

@@ -4,6 +4,7 @@ mod build;
 mod conventions;
 mod fr3;
 mod hash;
+mod likely_mistakes;
 mod meshes;
 mod mimic;
 mod oddities;

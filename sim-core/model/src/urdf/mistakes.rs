@@ -1,0 +1,106 @@
+//! What a file says that is allowed and probably not meant: misspelt names, degrees, millimetres.
+
+use std::f64::consts::TAU;
+
+/// Most things in a warning.
+const LISTED_MAX: usize = 8;
+/// Jaro-Winkler similarity of a misspelt name: `orgin`, `dampening` and `multiplicator` have 0.92 or more, and what
+/// simulators add to URDF has less than 0.8.
+const SIMILAR: f64 = 0.9;
+/// An angle above a turn is written by nobody who counts radians [rad]; 6.2832 is a turn, rounded.
+const ANGLE_USUAL: f64 = TAU + 0.01;
+/// Robots have no part of this size; one of 3 cm has it in millimetres [m].
+const SIZE_USUAL: f64 = 30.0;
+/// Names that other formats have for the same: element, name, and URDF's.
+const SYNONYMS: [(&str, &str, &str); 9] = [
+    ("limit", "min", "lower"),
+    ("limit", "max", "upper"),
+    ("limit", "torque", "effort"),
+    ("limit", "force", "effort"),
+    ("origin", "pos", "xyz"),
+    ("origin", "position", "xyz"),
+    ("origin", "euler", "rpy"),
+    ("origin", "rot", "rpy"),
+    ("mimic", "ratio", "multiplier"),
+];
+
+/// Likely mistakes of one file.
+#[derive(Default)]
+pub(super) struct Mistakes {
+    misspelt: Vec<String>,
+    degrees: Vec<String>,
+    large: Vec<String>,
+}
+
+impl Mistakes {
+    /// Keeps a name that was ignored and what it was probably meant to be, both as they are written.
+    pub fn misspelt(&mut self, what: &str, line: u32, meant: &str) {
+        let text = format!("{what} in line {line}: did you mean {meant}?");
+        self.misspelt.push(text);
+    }
+
+    /// Keeps angles if they look like degrees.
+    pub fn angles(&mut self, of: &str, line: u32, rpy: [f64; 3]) {
+        if rpy.iter().any(|angle| angle.abs() > ANGLE_USUAL) {
+            let [roll, pitch, yaw] = rpy;
+            self.degrees
+                .push(format!("{of} in line {line} ({roll} {pitch} {yaw})"));
+        }
+    }
+
+    /// Keeps a mesh if it is larger than any part of a robot [m].
+    pub fn mesh(&mut self, link: &str, file: &str, size: f64) {
+        if size > SIZE_USUAL {
+            self.large
+                .push(format!("{file} of link `{link}` ({size:.0} m)"));
+        }
+    }
+
+    /// One warning for each kind.
+    pub fn warnings(&self) -> Vec<String> {
+        let say = |things: &[String], before: &str, after: &str| {
+            let shown = things[..things.len().min(LISTED_MAX)].join(", ");
+            let more = if things.len() > LISTED_MAX {
+                ", …"
+            } else {
+                ""
+            };
+            (!things.is_empty()).then(|| format!("{before}: {shown}{more}{after}"))
+        };
+        let all = [
+            say(
+                &self.misspelt,
+                "names that URDF does not have are ignored",
+                " Mend them in the file",
+            ),
+            say(
+                &self.degrees,
+                "rpy turns more than once, so its angles look like degrees",
+                "; it counts radians, so divide them by 57.29578 in the file",
+            ),
+            say(
+                &self.large,
+                "collision meshes are larger than any part of a robot",
+                "; if they are in millimetres, give <mesh scale=\"0.001 0.001 0.001\">",
+            ),
+        ];
+        all.into_iter().flatten().collect()
+    }
+}
+
+/// Which of the known names an unknown one in this element was probably meant to be.
+pub(super) fn meant(element: &str, name: &str, known: &[&'static str]) -> Option<&'static str> {
+    let name = name.to_ascii_lowercase();
+    let synonym = SYNONYMS
+        .iter()
+        .find(|(place, other, _)| *place == element && *other == name);
+    if let Some((_, _, own)) = synonym {
+        return known.iter().copied().find(|known| known == own);
+    }
+    let likeness = |known: &&str| strsim::jaro_winkler(&name, known);
+    let nearest = known
+        .iter()
+        .copied()
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
+    (likeness(&nearest) >= SIMILAR).then_some(nearest)
+}

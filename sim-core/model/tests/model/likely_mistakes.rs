@@ -1,0 +1,170 @@
+//! What a URDF file may say and probably does not mean: a warning names it and what may be meant.
+
+use sim_model::{ModelError, Robot, UrdfOptions};
+
+use crate::build::assert_says;
+use crate::oddities::{PLAIN, read};
+
+/// The only warning of the plain text with something else in place of a part of it.
+#[track_caller]
+fn warning(part: &str, other: &str) -> String {
+    assert!(PLAIN.contains(part), "{part}");
+    let warnings = read(&PLAIN.replacen(part, other, 1)).warnings;
+    match &warnings[..] {
+        [one] => one.clone(),
+        _ => panic!("{other}: {warnings:?}"),
+    }
+}
+
+#[track_caller]
+fn assert_silent(part: &str, other: &str) {
+    assert!(PLAIN.contains(part), "{part}");
+    let warnings = read(&PLAIN.replacen(part, other, 1)).warnings;
+    assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn a_misspelt_name_is_warned_of_with_the_one_that_may_be_meant() {
+    let cases = [
+        (
+            "<link name=\"base\"/>",
+            "<link name=\"base\"><intertial/></link>",
+            "<inertial>",
+        ),
+        (
+            "<link name=\"base\"/>",
+            "<link name=\"base\"><colision/></link>",
+            "<collision>",
+        ),
+        (
+            "<link name=\"base\"/>",
+            "<link name=\"base\"><visuals/></link>",
+            "<visual>",
+        ),
+        (
+            "<origin xyz=\"1 0 0.001\" rpy=\"0 0 0.5\"/>",
+            "<orgin xyz=\"1 0 0\"/>",
+            "<origin>",
+        ),
+        ("<limit ", "<limits ", "<limit>"),
+        (
+            "lower=\"-1\" upper=\"1\"",
+            "min=\"-1\" max=\"1\"",
+            "`lower`",
+        ),
+        (
+            "lower=\"-1\" upper=\"1\"",
+            "Lower=\"-1\" Upper=\"1\"",
+            "`upper`",
+        ),
+        ("rpy=\"0 0 0.5\"", "RPY=\"0 0 0.5\"", "`rpy`"),
+        ("<origin xyz=\"1", "<origin pos=\"1", "`xyz`"),
+        ("<axis", "<dynamics dampening=\"1\"/><axis", "`damping`"),
+        ("<axis", "<dynamic damping=\"1\"/><axis", "<dynamics>"),
+    ];
+    for (part, other, meant) in cases {
+        let text = warning(part, other);
+        assert_says(
+            &text,
+            &["names that URDF does not have", " in line ", meant],
+        );
+    }
+    let text = PLAIN.replace(
+        "<joint name=\"elbow\"",
+        "<link name=\"finger\"><inertial><mass value=\"1\"/>\
+         <inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>\
+         <joint name=\"f\" type=\"continuous\"><parent link=\"arm\"/><child link=\"finger\"/>\
+         <mimic joint=\"elbow\" multiplicator=\"2\"/></joint><joint name=\"elbow\"",
+    );
+    assert_says(
+        &read(&text).warnings[0],
+        &["`multiplicator` of <mimic>", "`multiplier`"],
+    );
+}
+
+#[test]
+fn what_simulators_add_to_urdf_is_no_mistake() {
+    for own in [
+        "<contact><lateral_friction value=\"1\"/></contact>",
+        "<self_collision_checking/>",
+        "<gravity>1</gravity>",
+    ] {
+        assert_silent(
+            "<link name=\"base\"/>",
+            &format!("<link name=\"base\">{own}</link>"),
+        );
+    }
+    for own in [
+        "<safety_controller k_velocity=\"1\"/>",
+        "<calibration rising=\"0\"/>",
+        "<hardwareInterface/>",
+        "<physics/>",
+    ] {
+        assert_silent("<axis", &format!("{own}<axis"));
+    }
+    assert_silent(
+        "<limit ",
+        "<limit acceleration=\"3\" jerk=\"9\" max_velocity=\"2\" ",
+    );
+    assert_silent(
+        "<link name=\"base\"/>",
+        "<link name=\"base\"/><gazebo/><transmission name=\"t\"/>",
+    );
+    // what is there as it should be is not missed
+    assert_silent("<limit ", "<limits lower=\"0\"/><limit ");
+}
+
+#[test]
+fn rpy_beyond_a_turn_is_warned_of_as_degrees() {
+    let text = warning("rpy=\"0 0 0.5\"", "rpy=\"0 -90 0\"");
+    assert_says(
+        &text,
+        &[
+            "look like degrees",
+            "<origin> of joint `elbow`",
+            "(0 -90 0)",
+            "57.29578",
+        ],
+    );
+    assert_silent("rpy=\"0 0 0.5\"", "rpy=\"6.2832 -6.2832 3\"");
+}
+
+#[test]
+fn a_mesh_of_the_size_of_a_house_is_warned_of_as_millimetres() {
+    let folder = std::env::temp_dir().join(format!("tightloop-large-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(folder.join("m.obj"), corners).unwrap();
+    let load = |scale: f64| {
+        let text = format!(
+            "<robot name=\"r\"><link name=\"hand\"><collision><geometry>\
+             <mesh filename=\"m.obj\" scale=\"{scale} {scale} {scale}\"/></geometry></collision></link></robot>"
+        );
+        Robot::from_urdf_text(&text, folder.join("r.urdf"), UrdfOptions::default()).unwrap()
+    };
+    let warnings = [load(50.0).warnings, load(20.0).warnings];
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert_says(
+        &warnings[0][0],
+        &[
+            "m.obj of link `hand` (50 m)",
+            "millimetres",
+            "0.001 0.001 0.001",
+        ],
+    );
+    assert!(warnings[1].is_empty(), "{:?}", warnings[1]);
+}
+
+#[test]
+fn what_is_not_included_is_refused() {
+    let text = PLAIN.replacen("<link", "<xi:include href=\"arm.urdf\"/><link", 1);
+    let error = Robot::from_urdf_text(&text, "r.urdf", UrdfOptions::default()).unwrap_err();
+    assert!(matches!(error, ModelError::Urdf { .. }));
+    assert_says(&error.to_string(), &["<xi:include>", "is not followed"]);
+}
+
+#[test]
+fn a_tiny_axis_is_noted_in_few_digits() {
+    let robot = read(&PLAIN.replacen("<axis xyz=\"0 0 1\"", "<axis xyz=\"0 0 1e-300\"", 1));
+    assert_says(&robot.notes[0], &["axis of length 1e-300 is scaled to 1"]);
+}
