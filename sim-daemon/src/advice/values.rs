@@ -109,10 +109,10 @@ fn degrees(robot: &Robot, what: &str) -> Option<String> {
     })
 }
 
-/// Joints that start far outside of their limits.
+/// Joints that start far outside of their limits. A follower starts where its leader puts it.
 fn outside(robot: &Robot, what: &str) -> Option<String> {
     let mut found = Vec::new();
-    let mut is_large = false;
+    let (mut is_large, mut follows) = (false, false);
     for joint in moving(robot) {
         let (Some([lower, upper]), [q]) = (joint.range, joint.q.as_slice()) else {
             continue;
@@ -121,8 +121,9 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
         let slack = if is_angle { OUTSIDE[0] } else { OUTSIDE[1] };
         // draws are clamped to the limits
         let is_drawn = joint.dofs.iter().any(|dof| dof.offset_q.is_some());
-        if joint.mimic.is_none() && !is_drawn && (*q < lower - slack || *q > upper + slack) {
+        if !is_drawn && (*q < lower - slack || *q > upper + slack) {
             is_large |= is_angle && q.abs() > TAU;
+            follows |= joint.mimic.is_some();
             let unit = if is_angle { "rad" } else { "m" };
             found.push(format!(
                 "`{}` at {q:.4} {unit} ({lower:.4} to {upper:.4})",
@@ -131,9 +132,10 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
         }
     }
     (!found.is_empty()).then(|| {
-        let cure = match is_large {
-            true => "Angles are in radians: np.radians converts degrees.",
-            false => "The limits will push them back: set joint_q.",
+        let cure = match (is_large, follows) {
+            (_, true) => "Limits and leaders will push against each other: mend <mimic> or <limit> in the file.",
+            (true, false) => "Angles are in radians: np.radians converts degrees.",
+            (false, false) => "The limits will push them back: set joint_q.",
         };
         format!(
             "{what} starts far outside of joint limits: {}. {cure}",
