@@ -12,6 +12,8 @@ mod text;
 mod tree;
 mod wrap;
 
+use std::path::{Path, PathBuf};
+
 use serde_json::json;
 use sim_engine::dynamics::Dynamics;
 use sim_model::geometry::MeshOptions;
@@ -35,6 +37,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
             problem: error.to_string(),
         })?;
     }
+    check_paths(args)?;
     let exported = source::exported(args);
     let contents = exported.map(MujocoContents::read).transpose()?;
     let mut scene = match (exported, &contents) {
@@ -84,6 +87,28 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
     };
     let printed = say(&said);
     drawn.and(printed)
+}
+
+/// Refuses folders that are not there, and a picture under another format's name.
+fn check_paths(args: &Inspect) -> Result<(), DaemonError> {
+    let wrong = |argument, path: &Path, problem: &str| {
+        Err(DaemonError::Argument {
+            argument,
+            value: path.display().to_string(),
+            problem: problem.to_owned(),
+        })
+    };
+    if let Some(folder) = args.package_dirs.iter().find(|folder| !folder.is_dir()) {
+        return wrong("--package-dir", folder, "it is no folder; mend the path");
+    }
+    let is_png = |path: &&PathBuf| {
+        let ending = path.extension();
+        ending.is_none_or(|ending| ending.eq_ignore_ascii_case("png"))
+    };
+    match args.png.as_ref().filter(|path| !is_png(path)) {
+        Some(path) => wrong("--png", path, "the picture is PNG; end its name in .png"),
+        None => Ok(()),
+    }
 }
 
 fn say(said: &str) -> Result<(), DaemonError> {

@@ -1,6 +1,6 @@
-//! What the picture of a robot shows: its collision shapes, or what it looks like where it has none, and its surroundings.
+//! What the picture of a robot shows: its collision shapes, what links without any look like, and its surroundings.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use sim_model::geometry::{TriMesh, VisualMesh, triangles};
@@ -31,11 +31,17 @@ pub(super) fn drawing(
     let poses: Vec<Pose> = frames.chunks_exact(7).map(pose).collect();
     let [mut shapes, mut surroundings] = collisions(properties, &poses, args);
     let mut caption = configuration(properties, args);
-    if shapes.is_empty() {
-        let (looks, note) = looks(properties, &poses, args, exported)?;
+    let solid: HashSet<u32> = shapes.iter().map(|&(place, ..)| place).collect();
+    let is_bare = |place: usize| !solid.contains(&(place as u32));
+    if (0..poses.len()).any(is_bare) {
+        let (looks, note) = looks(properties, &poses, args, exported, is_bare)?;
         if !looks.is_empty() {
-            caption += "; visual shapes, since it has no collision shapes";
-            shapes = looks;
+            caption += match shapes.is_empty() {
+                true => "; visual shapes, since it has no collision shapes",
+                false => "; visual shapes of links without collision shapes",
+            };
+            shapes.extend(looks);
+            shapes.sort_by_key(|&(place, ..)| place);
         }
         caption += &note;
     }
@@ -110,12 +116,13 @@ fn configuration(properties: &Properties, args: &Inspect) -> String {
     caption
 }
 
-/// What the links look like, and a note of what cannot be shown.
+/// What the links at some places look like, and a note of what cannot be shown.
 fn looks(
     properties: &Properties,
     poses: &[Pose],
     args: &Inspect,
     exported: Option<&Path>,
+    is_meant: impl Fn(usize) -> bool,
 ) -> Result<(Vec<Drawn>, String), DaemonError> {
     let robot = properties.robot;
     let Visuals { visuals, .. } = match (exported, &robot.urdf) {
@@ -135,6 +142,7 @@ fn looks(
     let mut missing = 0;
     for visual in &visuals {
         let place = place_of.get(&visual.link).copied();
+        let place = place.filter(|&place| is_meant(place));
         // the world of a MuJoCo model is around the robot
         let place = place.filter(|&place| {
             robot.mujoco.is_none() || properties.joint(properties.order[place]).is_some()
@@ -150,7 +158,6 @@ fn looks(
             Err(_) => missing += 1,
         }
     }
-    drawn.sort_by_key(|shape: &Drawn| shape.0);
     let note = match missing {
         0 => String::new(),
         _ => format!("; {} cannot be shown", count(missing, "visual")),

@@ -241,6 +241,26 @@ fn a_robot_without_collisions_is_drawn_as_it_looks() {
 }
 
 #[test]
+fn a_link_without_collisions_is_drawn_as_it_looks_beside_links_that_have_some() {
+    let folder = Folder::new("bare");
+    let picture = |visual: &str| {
+        let text = format!(
+            "<robot name=\"r\"><link name=\"base\">{}</link><link name=\"head\">{visual}</link>\
+             <joint name=\"neck\" type=\"fixed\"><parent link=\"base\"/><child link=\"head\"/>\
+             <origin xyz=\"0 0 3\"/></joint></robot>",
+            ball(1.0)
+        );
+        folder.file("a.urdf", &text);
+        assert_eq!(inspect(&folder.0, &["a.urdf", "--png", "r.png"]).code, 0);
+        std::fs::read(folder.0.join("r.png")).unwrap()
+    };
+    let head = ball(1.0).replace("collision", "visual");
+    let [without, with, twice] = [String::new(), head.clone(), head.repeat(2)].map(|v| picture(&v));
+    assert_ne!(without, with);
+    assert_eq!(with, twice);
+}
+
+#[test]
 fn a_mesh_is_drawn_as_a_body() {
     let folder = Folder::new("mesh");
     let corners = "v 0 0 0\nv 1 0 0\nv 0 6 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";

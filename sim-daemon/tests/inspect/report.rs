@@ -212,6 +212,8 @@ fn a_misused_command_line_is_told_so() {
         ),
         (&["--joint-q", "a"], "invalid value 'a'"),
         (&["--mesh-max-hull-vertices", "3"], "between 8 and 1024"),
+        (&["--package-dir", "no/such"], "no/such\": it is no folder"),
+        (&["--png", "a.jpg"], "a.jpg\": the picture is PNG"),
         (&["--json", "--long"], "cannot be used with"),
         (&["--hulls"], "--png <FILE>"),
         (&["--colour"], "unexpected argument"),
