@@ -99,6 +99,18 @@ def test_a_follower_that_is_given_otherwise_starts_there_and_is_told(scene):
         np.testing.assert_allclose(sim.forward().joint_q[0], [row(0.5)[0], 0.5, 0.5, 0.0], atol=1e-15)
 
 
+def test_a_follower_whose_leader_puts_it_outside_of_its_limits_is_told(tmp_path):
+    joints = {"lead": "", "after": '<mimic joint="lead" multiplier="1" offset="2.5"/>'}
+    parts = "".join(LINK.format(name=f"{name}_link") + JOINT.format(name=name, mimic=m) for name, m in joints.items())
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="m"><link name="base"/>{parts}</robot>')
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_urdf(path)
+    message = r"outside of joint limits: `after` at 2\.5000 rad \(-2\.0000 to 2\.0000\).*mend <mimic> or <limit>"
+    with pytest.warns(tl.TightloopWarning, match=message):
+        tl.launch(scene, worlds=1).close()
+
+
 def test_equal_values_of_an_array_reach_the_daemon_as_they_are(scene):
     scene.robots["m"].joint_q = [0.3, 0.3, 0.3, 0.3]
     with pytest.warns(tl.TightloopWarning, match="starts with"), tl.launch(scene, worlds=1, precision="f64") as sim:
