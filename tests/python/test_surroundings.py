@@ -250,6 +250,22 @@ def test_a_root_that_takes_no_file_is_named_with_the_cure(pendulum, monkeypatch,
         tl.launch(pendulum, worlds=1)
 
 
+def test_a_lack_of_address_space_is_named_with_the_cure(pendulum, tmp_path):
+    pendulum.save(tmp_path / "scene.toml")
+    serve = [sys.executable, "-m", "tightloop", "serve", str(tmp_path / "scene.toml"), "--worlds", "100000"]
+    limit = 300 << 20
+    process = subprocess.run(
+        serve,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert process.returncode == 1
+    assert re.search(r"no more memory.*ulimit -v unlimited.*fewer worlds", process.stderr), process.stderr
+
+
 def test_a_snapshot_for_which_no_file_can_be_opened_says_so(pendulum):
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with tl.launch(pendulum, worlds=1) as sim:

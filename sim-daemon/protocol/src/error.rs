@@ -359,6 +359,10 @@ impl ProtocolError {
             _ => {
                 let problem = match (process::missing(), system) {
                     (Some(missing), _) => missing.to_owned(),
+                    (None, Some(error)) if error.kind() == io::ErrorKind::OutOfMemory => format!(
+                        "this process may have no more memory; raise its limit (`ulimit -v unlimited`), or use fewer \
+                         worlds ({error})"
+                    ),
                     (None, Some(error)) => format!("{problem:?}, {error}"),
                     (None, None) => format!("{problem:?}"),
                 };
