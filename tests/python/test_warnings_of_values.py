@@ -184,6 +184,14 @@ def test_stiffness_without_damping_is_told(tmp_path):
     damped = tl.Scene()
     arm(damped, tmp_path, damping=1.0, friction=0.0).joint_target_kd = 0.0
     assert told(damped) == []
+    # what a vendor's file has of damping and friction stops no stiff drive
+    barely = tl.Scene()
+    arm(barely, tmp_path, damping=0.003, friction=0.2).joint_target_kd = 0.0
+    [warning] = told(barely)
+    assert "nothing damps them" in warning
+    held = tl.Scene()
+    arm(held, tmp_path, damping=0.003, friction=5.0).joint_target_kd = 0.0
+    assert told(held) == []
 
 
 def test_gains_that_a_time_step_cannot_hold_shake_and_are_told(tmp_path):

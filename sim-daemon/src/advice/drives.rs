@@ -6,11 +6,15 @@ use sim_physics::constants::params::Param;
 use super::some;
 use super::values::moving;
 
+/// Share of critical damping below which a drive swings for minutes [–].
+const DAMPED: f64 = 0.01;
+/// How far from its target dry friction may hold a drive that swings all the same [rad or m].
+const HELD: f64 = 0.002;
+
 /// Advice on the drives of a robot from URDF.
 pub(super) fn advice(scene: &Description, robot: &Robot, what: &str) -> Vec<String> {
     let mut all: Vec<String> = powerless(scene, robot, what).into_iter().collect();
     all.extend(aimless(scene, robot, what));
-    all.extend(undamped(scene, robot, what));
     all
 }
 
@@ -63,36 +67,52 @@ fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
     })
 }
 
-/// Stiff drives of joints that nothing damps.
-fn undamped(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
+/// Stiff drives of joints that next to nothing damps. With inertia I, damping d and stiffness k the share of critical damping
+/// is d / (2 √(k I)); dry friction f holds a drive within f / k of its target.
+pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
     let params = [
         Param::JointTargetKe,
         Param::JointTargetKd,
         Param::JointDamping,
     ];
     if params.into_iter().any(|param| varies(scene, param)) {
-        return None;
+        return Vec::new();
     }
-    let names: Vec<String> = moving(robot)
-        .filter(|joint| {
-            let swings = |dof: &JointDof| {
+    let weights = model.dof_inverse_weight();
+    let mut first = 0;
+    let mut all = Vec::new();
+    for robot in &scene.robots {
+        let mut names = Vec::new();
+        for joint in moving(robot) {
+            let own = first..first + joint.dofs.len();
+            first = own.end;
+            let swings = |(dof, weight): (&JointDof, &f64)| {
+                let inertia = if *weight > 0.0 { weight.recip() } else { 0.0 };
                 dof.target_ke > 0.0
                     && dof.target_kd == 0.0
-                    && dof.damping == 0.0
-                    && dof.friction == 0.0
+                    && dof.target_mode != TargetMode::Velocity
+                    && dof.damping <= 2.0 * DAMPED * (dof.target_ke * inertia).sqrt()
+                    && dof.friction <= HELD * dof.target_ke
                     && dof.effort_limit != Some(0.0)
             };
-            joint.dofs.iter().any(swings)
-        })
-        .map(|joint| format!("`{}`", joint.name))
-        .collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "{what}: the drives of {} have stiffness and nothing damps them, so they swing about their targets. Set \
-             joint_target_kd, to about a tenth of joint_target_ke at first.",
-            some(&names)
-        )
-    })
+            if robot.mujoco.is_none() && joint.dofs.iter().zip(&weights[own]).any(swings) {
+                names.push(format!("`{}`", joint.name));
+            }
+        }
+        if !names.is_empty() {
+            let kind = match robot.urdf {
+                Some(_) => "robot",
+                None => "body",
+            };
+            all.push(format!(
+                "{kind} `{}`: the drives of {} have stiffness and nothing damps them, so they swing about their targets. Set \
+                 joint_target_kd, to about a tenth of joint_target_ke at first.",
+                robot.name,
+                some(&names)
+            ));
+        }
+    }
+    all
 }
 
 /// Drives that are too stiff for the time step. With inertia I, damping d and stiffness k a drive is unstable where

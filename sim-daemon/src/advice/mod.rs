@@ -24,6 +24,7 @@ pub(crate) fn advice(scene: &Description, model: &Arc<Model>) -> Vec<String> {
     all.extend(robots::advice(scene));
     all.extend(followers::advice(scene));
     all.extend(grounds::advice(scene));
+    all.extend(drives::swinging(scene, model));
     all.extend(drives::unstable(scene, model));
     all.extend(factors::advice(scene, model));
     all.extend(friction::advice(scene, model));
