@@ -2,6 +2,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use crate::files::percent_decoded;
+
 /// What a mesh path led to.
 pub(super) enum Found {
     /// The file.
@@ -31,7 +33,26 @@ pub(super) enum Found {
 /// folder that holds the file. An absolute path, plain or `file://`, says openly where it leads and is taken as it is; only
 /// regular files of a mesh format are ever opened. Symbolic links are followed wherever they lead: a URDF file cannot make
 /// one, and workspaces are installed as links to their sources.
+///
+/// A path that leads to no file is tried as Windows and addresses of the web write it: with backslashes, and with `%20` for
+/// a blank.
 pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {
+    let found = resolve_as_written(uri, folder, package_dirs);
+    if !matches!(found, Found::Missing(_)) {
+        return found;
+    }
+    let slashes = uri.trim().replace('\\', "/");
+    let decoded = percent_decoded(&slashes);
+    let others = [Some(slashes), decoded].into_iter().flatten();
+    let mut others = others
+        .filter(|other| other != uri)
+        .map(|other| resolve_as_written(&other, folder, package_dirs));
+    others
+        .find(|other| matches!(other, Found::File(_) | Found::Renamed { .. }))
+        .unwrap_or(found)
+}
+
+fn resolve_as_written(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {
     let (scheme, rest) = split_scheme(uri);
     let candidates = if let Some("package" | "model") = scheme.as_deref() {
         // writers of URDF put paths together with more slashes than one

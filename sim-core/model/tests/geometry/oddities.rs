@@ -265,3 +265,16 @@ fn a_file_of_another_format_is_called_by_its_own() {
         assert_refused(name, bytes, reason);
     }
 }
+
+#[test]
+fn a_buffer_of_gltf_may_have_a_blank_in_its_name() {
+    let folder = Folder::new("blank");
+    let y_up = mapped(&brick(), |[x, y, z]| [x, z, -y]);
+    folder.put("my brick.bin", gltf_buffer(&y_up));
+    for name in ["my%20brick.bin", "my brick.bin"] {
+        let text = gltf(&y_up, &format!("\"uri\":\"{name}\","), r#"{"mesh":0}"#);
+        assert_is_the_brick(&folder.load("a.gltf", text).unwrap());
+    }
+    let outside = gltf(&y_up, "\"uri\":\"%2e%2e/a.bin\",", r#"{"mesh":0}"#);
+    assert_refused("outside.gltf", outside, "is not a file beside it");
+}

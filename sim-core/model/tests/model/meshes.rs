@@ -130,6 +130,35 @@ fn more_slashes_than_needed_lead_to_the_same_file() {
 }
 
 #[test]
+fn paths_as_windows_and_the_web_write_them_lead_to_the_file() {
+    let package = Package::new("respelt");
+    let spaced = package.root.join("pkg/meshes/my hand.stl");
+    fs::write(&spaced, TETRAHEDRON).unwrap();
+    let read = |uri: &str| package.read("pkg/urdf", "collision", uri, UrdfOptions::default());
+    for uri in [
+        "..\\meshes\\my hand.stl",
+        "../meshes/my%20hand.stl",
+        "package://pkg/meshes/my%20hand.stl",
+        "package://pkg\\meshes\\my%20hand.stl",
+        "  ../meshes/my hand.stl ",
+    ] {
+        assert_leads_to(read(uri), &spaced);
+    }
+    // a file of that very name counts first
+    let plain = package.root.join("pkg/meshes/my%20hand.stl");
+    fs::write(&plain, TETRAHEDRON).unwrap();
+    assert_leads_to(read("../meshes/my%20hand.stl"), &plain);
+    for uri in [
+        "..\\..\\..\\secret.stl",
+        "%2e%2e/%2e%2e/secret.stl",
+        "../meshes/%zz.stl",
+    ] {
+        fs::write(package.root.join("secret.stl"), TETRAHEDRON).unwrap();
+        assert!(read(uri).is_err(), "{uri}");
+    }
+}
+
+#[test]
 fn more_slashes_lead_out_of_no_package() {
     let package = Package::new("slashes-out");
     for uri in [

@@ -8,6 +8,7 @@ use gltf::{Accessor, Document, buffer};
 
 use super::{Beside, FILE_MAX, bytes_of};
 use crate::cache_files::digest;
+use crate::files::percent_decoded;
 
 /// The bytes of a file's buffers.
 pub(super) struct Buffers {
@@ -150,6 +151,9 @@ fn external(uri: &str, folder: &Path, beside: &mut Vec<Beside>) -> Result<Vec<u8
     if let Some(data) = uri.strip_prefix("data:") {
         return base64_of(data).map_err(|reason| format!("a buffer's {reason}; export it again"));
     }
+    // glTF writes addresses, and many exporters plain names
+    let decoded = percent_decoded(uri).filter(|_| !folder.join(uri).is_file());
+    let uri = decoded.as_deref().unwrap_or(uri);
     let path = Path::new(uri);
     let inside = path
         .components()
