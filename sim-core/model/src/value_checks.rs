@@ -10,7 +10,7 @@ pub(crate) const NAME_MAX: usize = 256;
 /// Refuses a name that is empty or too long, or has a control character.
 pub(crate) fn name(what: &'static str, name: &str) -> Result<(), ModelError> {
     let rule = if name.trim().is_empty() || name.chars().any(char::is_control) {
-        "give it one or more printable characters"
+        "it must be of printable characters; give it one or more"
     } else if name.len() > NAME_MAX {
         "give it at most 256 bytes"
     } else {
