@@ -116,13 +116,8 @@ impl Reader<'_, '_> {
             self.notes
                 .push(format!("link `{link}`: mesh {} {note}", key.0.display()));
         }
-        let file = key.0.file_name().unwrap_or_default().to_string_lossy();
-        let [low, high] = mesh.triangles.extent();
-        let size = (0..3)
-            .map(|axis| high[axis] - low[axis])
-            .fold(0.0, f64::max);
-        self.scan.mistakes.mesh(link, &short(&file), size);
         if let Some(axis) = mesh.ignored_up_axis {
+            let file = key.0.file_name().unwrap_or_default().to_string_lossy();
             let named = (short(&file), axis);
             if !self.unturned.contains(&named) {
                 self.unturned.push(named);

@@ -1,4 +1,4 @@
-//! What a file says that is allowed and probably not meant: misspelt names, degrees, millimetres.
+//! What a file says that is allowed and probably not meant: misspelt names, and degrees.
 
 use std::f64::consts::TAU;
 
@@ -9,8 +9,6 @@ const LISTED_MAX: usize = 8;
 const SIMILAR: f64 = 0.9;
 /// An angle above a turn is written by nobody who counts radians [rad]; 6.2832 is a turn, rounded.
 const ANGLE_USUAL: f64 = TAU + 0.01;
-/// Robots have no part of this size; one of 3 cm has it in millimetres [m].
-const SIZE_USUAL: f64 = 30.0;
 /// Names that other formats have for the same: element, name, and URDF's.
 const SYNONYMS: [(&str, &str, &str); 9] = [
     ("limit", "min", "lower"),
@@ -29,30 +27,26 @@ const SYNONYMS: [(&str, &str, &str); 9] = [
 pub(super) struct Mistakes {
     misspelt: Vec<String>,
     degrees: Vec<String>,
-    large: Vec<String>,
 }
 
 impl Mistakes {
-    /// Keeps a name that was ignored and what it was probably meant to be, both as they are written.
-    pub fn misspelt(&mut self, what: &str, line: u32, meant: &str) {
-        let text = format!("{what} in line {line}: did you mean {meant}?");
-        self.misspelt.push(text);
-    }
-
-    /// Keeps angles if they look like degrees.
-    pub fn angles(&mut self, of: &str, line: u32, rpy: [f64; 3]) {
-        if rpy.iter().any(|angle| angle.abs() > ANGLE_USUAL) {
-            let [roll, pitch, yaw] = rpy;
-            self.degrees
-                .push(format!("{of} in line {line} ({roll} {pitch} {yaw})"));
+    /// Keeps a name that was ignored and what it was probably meant to be, both as they are written. To count lines takes
+    /// time, so that is done for the few that are listed.
+    pub fn misspelt(&mut self, what: &str, line: impl FnOnce() -> u32, meant: &str) {
+        if self.misspelt.len() <= LISTED_MAX {
+            let line = line();
+            let text = format!("{what} in line {line}: did you mean {meant}?");
+            self.misspelt.push(text);
         }
     }
 
-    /// Keeps a mesh if it is larger than any part of a robot [m].
-    pub fn mesh(&mut self, link: &str, file: &str, size: f64) {
-        if size > SIZE_USUAL {
-            self.large
-                .push(format!("{file} of link `{link}` ({size:.0} m)"));
+    /// Keeps angles if they look like degrees; `place` has their element and line.
+    pub fn angles(&mut self, rpy: [f64; 3], place: impl FnOnce() -> (String, u32)) {
+        let is_beyond = rpy.iter().any(|angle| angle.abs() > ANGLE_USUAL);
+        if is_beyond && self.degrees.len() <= LISTED_MAX {
+            let ([roll, pitch, yaw], (of, line)) = (rpy, place());
+            self.degrees
+                .push(format!("{of} in line {line} ({roll} {pitch} {yaw})"));
         }
     }
 
@@ -77,11 +71,6 @@ impl Mistakes {
                 &self.degrees,
                 "rpy turns more than once, so its angles look like degrees",
                 "; it counts radians, so divide them by 57.29578 in the file",
-            ),
-            say(
-                &self.large,
-                "collision meshes are larger than any part of a robot",
-                "; if they are in millimetres, give <mesh scale=\"0.001 0.001 0.001\">",
             ),
         ];
         all.into_iter().flatten().collect()

@@ -231,8 +231,9 @@ impl<'a, 'input> Scan<'a, 'input> {
             });
             let absent: Vec<&str> = absent.map(|(known, _)| known.name).collect();
             if let Some(meant) = mistakes::meant(tag.name, name, &absent).filter(|_| own) {
-                let line = self.line(child);
-                self.mistakes.misspelt(&what, line, &format!("<{meant}>"));
+                let (document, meant) = (self.document, format!("<{meant}>"));
+                self.mistakes
+                    .misspelt(&what, || line_of(document, child), &meant);
             }
             self.ignore(child, what);
             return Ok(());
@@ -270,8 +271,9 @@ impl<'a, 'input> Scan<'a, 'input> {
                 let absent: Vec<&str> = absent.collect();
                 let meant = mistakes::meant(tag.name, &name, &absent);
                 if let Some(meant) = meant.filter(|_| attribute.namespace().is_none()) {
-                    let line = self.line(node);
-                    self.mistakes.misspelt(&what, line, &format!("`{meant}`"));
+                    let (document, meant) = (self.document, format!("`{meant}`"));
+                    self.mistakes
+                        .misspelt(&what, || line_of(document, node), &meant);
                 }
                 self.ignore(node, what);
             }
@@ -290,8 +292,10 @@ impl<'a, 'input> Scan<'a, 'input> {
                     }
                     if known.kind == Kind::Angles {
                         let [roll, pitch, yaw, _] = value.numbers;
-                        let (of, line) = (describe(node), self.line(node));
-                        self.mistakes.angles(&of, line, [roll, pitch, yaw]);
+                        let document = self.document;
+                        self.mistakes.angles([roll, pitch, yaw], || {
+                            (describe(node), line_of(document, node))
+                        });
                     }
                     if known.name == "quat_xyzw" {
                         self.quaternion(node, value.numbers)?;
@@ -390,6 +394,11 @@ impl<'a, 'input> Scan<'a, 'input> {
     }
 
     fn line(&self, node: Node) -> u32 {
-        self.document.text_pos_at(node.range().start).row
+        line_of(self.document, node)
     }
+}
+
+/// The line of an element, counted from the start of the text.
+fn line_of(document: &Document, node: Node) -> u32 {
+    document.text_pos_at(node.range().start).row
 }

@@ -130,32 +130,6 @@ fn rpy_beyond_a_turn_is_warned_of_as_degrees() {
 }
 
 #[test]
-fn a_mesh_of_the_size_of_a_house_is_warned_of_as_millimetres() {
-    let folder = std::env::temp_dir().join(format!("tightloop-large-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
-    std::fs::write(folder.join("m.obj"), corners).unwrap();
-    let load = |scale: f64| {
-        let text = format!(
-            "<robot name=\"r\"><link name=\"hand\"><collision><geometry>\
-             <mesh filename=\"m.obj\" scale=\"{scale} {scale} {scale}\"/></geometry></collision></link></robot>"
-        );
-        Robot::from_urdf_text(&text, folder.join("r.urdf"), UrdfOptions::default()).unwrap()
-    };
-    let warnings = [load(50.0).warnings, load(20.0).warnings];
-    std::fs::remove_dir_all(&folder).unwrap();
-    assert_says(
-        &warnings[0][0],
-        &[
-            "m.obj of link `hand` (50 m)",
-            "millimetres",
-            "0.001 0.001 0.001",
-        ],
-    );
-    assert!(warnings[1].is_empty(), "{:?}", warnings[1]);
-}
-
-#[test]
 fn what_is_not_included_is_refused() {
     let text = PLAIN.replacen("<link", "<xi:include href=\"arm.urdf\"/><link", 1);
     let error = Robot::from_urdf_text(&text, "r.urdf", UrdfOptions::default()).unwrap_err();
@@ -167,4 +141,34 @@ fn what_is_not_included_is_refused() {
 fn a_tiny_axis_is_noted_in_few_digits() {
     let robot = read(&PLAIN.replacen("<axis xyz=\"0 0 1\"", "<axis xyz=\"0 0 1e-300\"", 1));
     assert_says(&robot.notes[0], &["axis of length 1e-300 is scaled to 1"]);
+}
+
+#[test]
+fn thousands_of_likely_mistakes_are_counted_in_no_time_and_listed_in_few() {
+    let links: String = (0..4000)
+        .map(|index| {
+            format!(
+                "<link name=\"l{index}\"><colision/><collision><origin rpy=\"0 0 90\" pos=\"1\"/>{}\
+                 <geometry><sphere radius=\"1\"/></geometry></collision></link>\n",
+                " ".repeat(1000)
+            )
+        })
+        .collect();
+    let text = format!("<robot name=\"r\">{links}</robot>");
+    let start = std::time::Instant::now();
+    let error = Robot::from_urdf_text(&text, "r.urdf", UrdfOptions::default()).unwrap_err();
+    // counting lines for each would take most of a minute
+    assert!(
+        start.elapsed() < std::time::Duration::from_secs(5),
+        "{:?}",
+        start.elapsed()
+    );
+    assert!(error.to_string().len() < 1000, "{error}");
+    let [first, second] = [8, 20].map(|count| {
+        let colisions = "<colision/>\n".repeat(count);
+        let link = format!("<link name=\"base\">{colisions}</link>");
+        warning("<link name=\"base\"/>", &link)
+    });
+    assert!(!first.contains('…') && second.contains('…'), "{second}");
+    assert!(second.len() < 2 * first.len());
 }
