@@ -122,7 +122,7 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             // a polygon with holes has its outline in <p> within <ph>
             let list = list.child("p").unwrap_or(list);
             let indices = numbers::<u32>(Some(list))?;
-            if indices.len() % stride != 0 {
+            if !indices.len().is_multiple_of(stride) {
                 let found = indices.len();
                 return Err(format!(
                     "a <p> has {found} indices, {stride} a corner; it was cut short, export it again"
@@ -309,7 +309,7 @@ fn places(
     counts: &mut impl Iterator<Item = usize>,
 ) -> Result<Vec<[usize; 3]>, String> {
     Ok(match kind {
-        "triangles" if corners % 3 != 0 => {
+        "triangles" if !corners.is_multiple_of(3) => {
             return Err(format!(
                 "a <p> of <triangles> has {corners} corners, 3 a triangle; it was cut short, export it again"
             ));
