@@ -36,7 +36,7 @@ pub(crate) enum CliCommand {
     /// Show what a robot file means: tree, dofs, masses, limits, repairs, and a picture.
     ///
     /// Reads URDF and, with the Python package and MuJoCo, MJCF. Also lists what the reader ignored or refused. The picture
-    /// shows the collision shapes.
+    /// shows the collision shapes, and what links without any look like.
     ///
     /// Example: tightloop inspect robot.urdf --png robot.png
     Inspect(Inspect),
