@@ -43,22 +43,19 @@ WINE := wine wine64 gcc-mingw-w64-x86-64
   $(addprefix announce-,demo test docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
-# The tour comes first because it draws within seconds.
+# The tour comes first because it draws within seconds. The wheel is all that is compiled: a program beside it would
+# compile most crates again, with the features of the whole workspace.
 demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp with plots, into out/ (WORLDS=256)
 	$(PYTHON) -m tightloop demo --out out/demo
 	$(PYTHON) examples/franka_lesson.py --worlds $(WORLDS)
 	$(PYTHON) examples/franka_grasp.py --worlds $(WORLDS)
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
-	@echo && echo "The same in process, without daemon and Python:"
-	@cargo build --release --quiet --workspace --example franka_lesson && "$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS)
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 # Debian packages come first: without root, the request for them appears before minutes of compiling.
-test: announce-test vulkan browser wheel $(VENV)/.dev $(VENV)/.docs ## every Rust and Python test
-	cargo fmt --all --check
-	$(CLIPPY)
+test: announce-test vulkan browser check ## what `check` does, then every Rust and Python test
 	@if cargo nextest --version >/dev/null 2>&1; \
 	then set -x; cargo nextest run --release --workspace; \
 	else set -x; cargo test --release --workspace --lib --bins --tests; fi
@@ -178,6 +175,8 @@ newcomer: wheel ## time a clean checkout with empty caches, a built one, a wheel
 bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is compared with
 	cargo bench --package tightloop --bench step
 	cargo bench --package sim-device --bench replay
+	cargo build --release --quiet --workspace --example franka_lesson
+	"$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS) # in process, without daemon and Python
 	$(PYTHON) benches/peers.py
 	$(PYTHON) benches/contacts.py
 	$(PYTHON) benches/legged.py
