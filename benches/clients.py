@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from record import REPOSITORY, print_table, write_results
@@ -91,14 +92,19 @@ def main() -> int:
     rows: list[dict[str, str | int]] = []
     for client, rounds in trips.items():
         p50, p99 = np.median(rounds, axis=0)
-        row = {"client": client, "p50_us": f"{p50:.2f}", "p50_us_best": f"{min(rounds)[0]:.2f}", "p99_us": f"{p99:.2f}"}
+        row: dict[str, Any] = {
+            "client": client,
+            "p50_us": f"{p50:.2f}",
+            "p50_us_best": f"{min(rounds)[0]:.2f}",
+            "p99_us": f"{p99:.2f}",
+        }
         rows.append({**row, "asked_p50_us": f"{ASKED_US[client]:g}"})
     print_table(rows)
     busy = f"{np.median(load):.2f} of {os.cpu_count()} cores, at most {max(load):.2f}"
     print(f"busy with other programs: {busy}")
     facts = {"command": "python benches/clients.py", "worlds": 1, "threads": 1, "steps": STEPS, "rounds": ROUNDS}
     write_results("clients", rows, facts | {"other_load": busy, "priority": f"nice {os.nice(0)}"})
-    return int(any(float(row["p50_us"]) > ASKED_US[row["client"]] for row in rows))
+    return int(any(float(row["p50_us"]) > ASKED_US[str(row["client"])] for row in rows))
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ def ours(ground: terrain.Terrain | None, worlds: int, steps: int, *, scan: bool 
         start[:, :2] = rng.uniform(-0.4, 0.4, (worlds, 2)) * SIDE
         start[:, 2] = 0.9 + (0.0 if ground is None else ground.height(*start[:, :2].T.astype(float)))
         frame, faulted, contacts = sim.write(joint_q=start), 0, []
-        begun = time.perf_counter()
+        begun, controls = time.perf_counter(), np.zeros((worlds, model.nu), np.float32)
         for step in range(WARM_UP + steps):
             if step == WARM_UP:
                 begun = time.perf_counter()
@@ -112,7 +112,7 @@ def measure(name: str, ground: terrain.Terrain | None, worlds: int, steps: int, 
 
 def main() -> int:
     """Measure, print and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--worlds", type=int, default=512)
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--rounds", type=int, default=3)

@@ -63,7 +63,7 @@ def main() -> None:
                 x, y, _ = (float(value) for value in envs.frame.joint_q[:, :3].mean(axis=0))
                 camera = Camera((x + 1.6, y - 2.9, 1.5), (x + 0.6, y + 1.2, 0.1), 0.7)
                 images.append(Image.fromarray(picture.render(envs.frame, camera=camera, contacts=False)))
-            obs, *_ = envs.step(policy.run(["action"], {"obs": obs})[0])
+            obs, *_ = envs.step(np.asarray(policy.run(["action"], {"obs": obs})[0]))
     finally:
         envs.close()
     duration = round(1000 * EVERY * envs.control_dt)

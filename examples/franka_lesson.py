@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -98,8 +99,9 @@ def run(title: str, sim: tl.Sim, command: str, values: Callable[[int, NDArray[np
     commands, trips = [], []
     for frame in tqdm(range(FRAMES), desc=title, unit="frame", disable=None):
         action = values(frame, amplitudes)
+        given: dict[str, Any] = {command: {"arm": action}}
         start = time.perf_counter()
-        observed = sim.step(**{command: {"arm": action}})
+        observed = sim.step(**given)
         trips.append(time.perf_counter() - start)
         joint_q.append(observed.joint_q[shown])
         commands.append(action[0])

@@ -4,7 +4,7 @@ It uses what `tightloop.env.Task` offers for robots that walk: memory of the epi
 change within an episode, pushes, a history of observations, and an observation for the critic alone.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class Walk(Task):
     fields = ("joint_q", "joint_qd", "joint_torque", "contact_sensor", "site_q")
     max_episode_steps = 1000  # 20 s
     goal_draws, goal_steps = 3, 250  # a command every 5 s
-    reward_weights: ClassVar = {
+    reward_weights: Mapping[str, float] = {
         "speed": 1.5 * STEP,
         "turn": 0.75 * STEP,
         "gait": 1.0 * STEP,

@@ -251,10 +251,12 @@ def compare(session: onnxruntime.InferenceSession, facts: Facts, options: dict[s
         if isinstance(task.robot, LeggedModel):
             start = task.robot.start_q  # the scene begins where the file does
         ours, theirs = InTightloop(facts, task, sim), InMujoco(facts, task.robot, scene)
-        ours.begin(start, commands[1]), theirs.begin(start, commands[1])
+        for simulation in (ours, theirs):
+            simulation.begin(start, commands[1])
         for step in range(1, OPEN_LOOP + 1):
             action = policy(ours.obs)
-            ours.step(action), theirs.step(action)
+            for simulation in (ours, theirs):
+                simulation.step(action)
             if step in (1, 5, 10, 25, OPEN_LOOP):
                 joints, seen = (np.abs(a - b).max() for a, b in ((ours.joints, theirs.joints), (ours.obs, theirs.obs)))
                 seconds = step * facts.number("control_dt")

@@ -47,7 +47,8 @@ def test_what_killed_processes_left_goes_and_what_others_write_stays(folder: Pat
         keep(f"file{number}")
     for name, age in ((".tightloop-1.toml", 7200), (".tightloop-2.toml", 60)):
         (folder / name).write_bytes(bytes(5000))
-        os.utime(folder / name, (time.time() - age,) * 2)
+        then = time.time() - age
+        os.utime(folder / name, (then, then))
     keep("new")
     assert {path.name for path in folder.iterdir() if path.name.startswith(".")} == {".tightloop-2.toml"}
 

@@ -107,7 +107,7 @@ def test_a_wrong_entry_is_refused_and_changes_nothing(dog, key, value, named):
     assert np.array_equal(dog.joint_q, before)
 
 
-def test_a_floating_base_may_be_left_out(scene, dog):
+def test_a_floating_base_may_be_left_out(scene, dog: tl.Robot):
     dog.joint_q = [0.1, 0.2, 0.3, 0.4]
     dog.pos = (1, 2, 3)
     assert dog.joint_q.tolist() == [1, 2, 3, 0, 0, 0, 1, 0.1, 0.2, 0.3, 0.4]
@@ -125,13 +125,13 @@ def test_a_floating_base_may_be_left_out(scene, dog):
         np.testing.assert_allclose(sim.forward().joint_q[0], [1, 2, 3, 0, 0, 0, 1, 0.1, 0.1, 0.1, 0.1], atol=1e-6)
 
 
-def test_a_base_that_was_set_stays_where_it_was_set(dog):
+def test_a_base_that_was_set_stays_where_it_was_set(dog: tl.Robot):
     dog.joint_q = [9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 0]
     dog.pos = (1, 2, 3)
     assert dog.joint_q[:3].tolist() == [9, 9, 9]
 
 
-def test_names_and_patterns(dog):
+def test_names_and_patterns(dog: tl.Robot):
     dog.joint_q = {".*_hip": 0.1, "left_knee": 0.4}
     assert dog.joint_q[7:].tolist() == [0.1, 0.4, 0.1, 0.0]
     dog.joint_q = {".*_knee": -0.2, "right_knee": 0.3}  # a name counts, whatever the order
@@ -152,7 +152,7 @@ def test_names_and_patterns(dog):
         dog.joint_q = {".*_hip": 0.1, "left_.*": 0.2}
 
 
-def test_a_scene_file_keeps_what_was_set_without_the_base(scene, dog, tmp_path):
+def test_a_scene_file_keeps_what_was_set_without_the_base(scene, dog: tl.Robot, tmp_path):
     dog.joint_q = {".*_hip": 0.1}
     scene.save(tmp_path / "scene.toml")
     loaded = tl.Scene.load(tmp_path / "scene.toml").robots["dog"]
@@ -208,9 +208,9 @@ def test_entries_of_parameters_and_frames(scene):
         with pytest.raises(tl.CommandRefused, match=r"read-only.*copy"):
             frame.status |= 1
         with pytest.raises(tl.CommandRefused, match=r"`joint_q` of a frame is read-only.*sim\.write"):
-            frame.joint_q = 1.0
+            frame.joint_q = 1.0  # type: ignore[misc]
         with pytest.raises(tl.CommandRefused, match=r"no entries, such as 'joint_q'.*frame\.joint_q\[world\]"):
-            frame["joint_q"]
+            frame["joint_q"]  # type: ignore[index]
         own = frame.joint_q.copy()
         own[0, 0] = 1.0
         own += 1.0
@@ -248,7 +248,7 @@ def test_an_argument_that_does_not_exist_suggests_another(scene, file):
         scene.add_urdf(file, rpy=(0, 0, 1))
 
 
-def test_what_can_only_be_read_says_so(scene, dog):
+def test_what_can_only_be_read_reports_it(scene, dog):
     with pytest.raises(
         tl.UnknownAttribute, match=r"robot `dog`: `floating` can only be read; it is an argument of add_urdf"
     ):
@@ -330,7 +330,7 @@ def test_files_that_come_with_the_package():
     envs = VectorEnv("CartPoleSwingUp", 16)
     try:
         policy = tl.assets.policy("CartPoleSwingUp")
-        obs, _ = envs.reset(seed=1)
+        obs, infos = envs.reset(seed=1)
         for _ in range(400):
             obs, _, _, _, infos = envs.step(policy(obs))
         assert infos["success"].mean() > 0.8

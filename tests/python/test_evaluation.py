@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def test_95_of_100_intervals_hold_the_mean(count: int) -> None:
     assert abs(np.mean(held) - 0.95) < 3 * (0.95 * 0.05 / 4000) ** 0.5
 
 
-def test_means_are_told_with_their_intervals() -> None:
+def test_means_are_reported_with_their_intervals() -> None:
     assert told_with_intervals({"return": np.array([1.0, 2.0, 3.0])}) == "return 2 (-0.4843 to 4.484)"
 
 
@@ -65,6 +66,7 @@ def test_a_played_policy_has_a_success_only_if_its_task_has_one(task, end, envs)
     import play
 
     made = envs(task, 4, autoreset_mode="SameStep")
-    kept = play.play(made, Still(), 0, None)
+    still: Any = Still()
+    kept = play.play(made, still, 0, None)
     assert ("success" in kept) == (task is Upright)
     assert play.summary("Own", kept) == f"Own: return 5 {end}"

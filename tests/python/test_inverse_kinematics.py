@@ -143,6 +143,7 @@ def test_two_hands_a_floating_base_and_a_ball_are_moved_together(tmp_path: Path)
     # held, the base stays
     joint = tl.ik(walker, tl.Reach("walker/foot", orientation_weight=0), joints=["walker/hip", "walker/knee"])
     held = joint.solve([0.3, 0.3, 0.4])
+    assert joint.start is not None
     np.testing.assert_array_equal(held.joint_q[:7], joint.start[:7])
     assert held.position_error < 1e-4 or not held.success
 
@@ -190,6 +191,7 @@ def test_a_frame_reaches_a_pose_on_another_link(fr3):
         np.testing.assert_allclose(np.linalg.norm(found[:3] - target[:3]), solved.position_error, atol=1e-12)
         np.testing.assert_allclose(angles(found[3:], target[3:]), solved.rotation_error, atol=1e-7)
         assert solved.success
+        assert solver.start is not None
         # joints below the other link move neither against it
         np.testing.assert_array_equal(solved.joint_q[:3], solver.start[:3])
 
@@ -338,13 +340,12 @@ def test_mistakes_are_named_with_a_cure(fr3, call, said):
 
 
 def test_inverse_kinematics_bounds_its_work_and_names_the_bound(pendulum):
-    target = {"restarts": 10**6}
     named = r"50 iterations .* 1000001 attempts; .*`iterations` and `restarts`.* 1000000"
     with pytest.raises(tl.ArgumentError, match=named):
-        tl.ik(pendulum, tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), **target)
+        tl.ik(pendulum, tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), restarts=10**6)
     with tl.launch(pendulum, worlds=2) as sim:
         with pytest.raises(tl.CommandRefused, match=named):
-            sim.ik(tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), **target)
+            sim.ik(tl.Reach("arm/lower", orientation_weight=0)).solve((9, 9, 9), restarts=10**6)
         sim.step()
 
 

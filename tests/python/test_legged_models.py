@@ -17,6 +17,7 @@ import tightloop as tl
 from tightloop.assets import CARTPOLE, FR3, HUMANOID, QUADRUPED
 from tightloop.env import VectorEnv, policy_metadata
 from tightloop.tasks.humanoid import HumanoidVelocityFlat
+from tightloop.tasks.legged import LeggedModel
 from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 from tightloop.tasks.quadruped_rough import QuadrupedVelocityRough
 
@@ -269,6 +270,7 @@ def test_an_environment_takes_a_model_by_name(envs: Any) -> None:
 @pytest.mark.parametrize("kind", ["MJCF", "ant"])
 def test_mujoco_moves_a_robot_from_mjcf_on_its_plane_as_tightloop_does(kind: str, tmp_path: Path) -> None:
     task = QuadrupedVelocityFlat(model=file_of(tmp_path) if kind == "MJCF" else ANT)
+    assert isinstance(task.robot, LeggedModel)
     theirs = task.robot.on_ground()
     data, rng = mujoco.MjData(theirs), np.random.default_rng(0)
     touched = 0

@@ -43,7 +43,7 @@ def test_simulations_and_frames_show_tables(scene):
         frame = sim.forward()
         assert escape(sim.device) in sim._repr_html_() and "arm, cube" in sim._repr_html_()
         for shown in (frame, frame.copy()):
-            html = shown._repr_html_()
+            html = getattr(shown, "_repr_html_")()  # noqa: B009  (the class of frames in Rust has it from Python)
             assert "joint_q" in html and "(3, 16)" in html and "float32" in html
 
 
@@ -103,7 +103,8 @@ def test_kept_meshes_are_bounded_and_go_with_their_simulation(tmp_path):
     assert sims[0].picture(size=(64, 48)).size == (64, 48)
     for sim in sims[:-1]:
         sim.close()
-    del sims[-1], sim
+        del sim
+    del sims[-1]
     gc.collect()
     assert all(mesh() is None for mesh in meshes) and not kept_picture._kept
 

@@ -42,7 +42,7 @@ def test_a_quadruped_has_the_joints_gains_and_parts_of_its_task(metadata: Callab
     assert said["robot_files"] == "quadruped.urdf"
     assert said["joint_names"].split(",") == joints == said["action_names"].split(",")
     assert set(said["action_types"].split(",")) == {"JointTarget"}
-    for name, value in (
+    expected: tuple[tuple[str, Any], ...] = (
         ("dt", velocity.DT),
         ("substeps", velocity.SUBSTEPS),
         ("control_dt", velocity.CONTROL_DT),
@@ -57,8 +57,9 @@ def test_a_quadruped_has_the_joints_gains_and_parts_of_its_task(metadata: Callab
         ("action_high", velocity.LIMIT),
         ("observation_sizes", (3, 3, 3, 3, 12, 12, 12, 2)),
         ("observation_history", 1),
-    ):
-        assert (numbers(said[name]).astype(np.float32) == np.float32(value)).all(), name
+    )
+    for name, value in expected:
+        assert (numbers(said[name]).astype(np.float32) == np.array(value, np.float32)).all(), name
     assert said["observation_names"].split(",")[3:5] == ["command", "joint positions"]
     # a comma within an entry would divide it
     assert said["observation_units"].split(",")[3] == "m/s; rad/s"
@@ -94,7 +95,8 @@ def test_lists_are_as_long_as_what_they_describe(task: str, metadata: Callable[.
     said = metadata(task)
     assert said["task"] == (f"tightloop/{task}" if task in GYMNASIUM_TASKS else f"tightloop/{task}-v0")
     envs = VectorEnv(said["task"], 1, threads=1)
-    (observed,), (actions,) = envs.single_observation_space.shape, envs.single_action_space.shape
+    spaces = (envs.single_observation_space, envs.single_action_space)
+    observed, actions = (int(np.prod(space.shape or ())) for space in spaces)
     envs.close()
     for name in ("action_names", "action_types", "action_scale", "action_offset", "action_low", "action_high"):
         assert len(said[name].split(",")) == actions
@@ -113,12 +115,14 @@ def test_a_task_adds_entries_and_the_environment_goes_on(metadata: Callable[...,
     assert (said["flag"], said["one"], said["flags"]) == ("True", "0.1", "True,False")
     assert said["task"].endswith("Own")
     ours, plain = VectorEnv(Own, 4, threads=1), VectorEnv(CartPoleBalance, 4, threads=1)
-    ours.reset(seed=1), plain.reset(seed=1)
+    for envs in (ours, plain):
+        envs.reset(seed=1)
     policy_metadata(ours)
     actions = np.full((4, 1), 0.3, np.float32)
     for _ in range(5):
         assert np.array_equal(ours.step(actions)[0], plain.step(actions)[0])
-    ours.close(), plain.close()
+    for envs in (ours, plain):
+        envs.close()
 
 
 def test_an_entry_that_is_no_text_is_refused(metadata: Callable[..., dict[str, str]]) -> None:
@@ -143,7 +147,7 @@ class Chosen(QuadrupedVelocityFlat):
         super().__init__(pushes, stiffness={".*_calf": 50.0})
 
 
-def test_options_are_told_of_tasks_that_take_them() -> None:
+def test_options_are_reported_of_tasks_that_take_them() -> None:
     for task, told in ((Chosen(), False), (QuadrupedVelocityFlat(stiffness={".*_calf": 50.0}), True)):
         envs = VectorEnv(task, 1)
         metadata = policy_metadata(envs)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,7 +40,9 @@ def distance(sim: tl.Sim, name: str, command: str, values: Callable[[int], NDArr
     """Largest difference of a joint position from the reference, by frame."""
     reference = recorded(name)
     rows = [sim.reset().joint_q.astype(float)]
-    rows += [sim.step(**{command: {"arm": values(frame)}}).joint_q.astype(float) for frame in range(FRAMES)]
+    for frame in range(FRAMES):
+        given: dict[str, Any] = {command: {"arm": values(frame)}}
+        rows.append(sim.step(**given).joint_q.astype(float))
     assert all(np.array_equal(row, np.broadcast_to(row[0], row.shape)) for row in rows), "equal worlds stay equal"
     return np.abs(np.array(rows)[:, 0] - reference[:, 1:10]).max(axis=1)
 

@@ -311,7 +311,7 @@ def test_pushes_are_impulses_of_one_step_at_random_times_of_the_seed() -> None:
         assert not gained[..., 2].any(), "horizontal"
         for world in range(WORLDS):
             between = np.diff(np.flatnonzero(hit[:, world]))
-            # 0.1 to 0.4 s of 20 ms; a push of next to nothing may not show
+            # 0.1 to 0.4 s of 20 ms; a tiny push may not show
             assert between.min() >= 5 and np.median(between) <= 20
         assert len({tuple(np.flatnonzero(hit[:, world])) for world in range(WORLDS)}) == WORLDS
         again = [envs.reset(seed=9)[0]] + [envs.step(still)[0] for _ in range(50)]
@@ -429,7 +429,10 @@ def test_a_symmetry_that_does_not_fit_is_refused_by_name(flips: Mirror, named: s
     [
         (lambda: Push("box", 0.0, (1.0, 2.0)), "Push: impulse"),
         (lambda: Push("box", 1.0, (2.0, 1.0)), "Push: interval is .*; give the shorter time first"),
-        (lambda: Push("box", 1.0, 3.0), "Push: interval is 3.0; give the shortest and the longest time"),
+        (
+            lambda: Push("box", 1.0, 3.0),  # type: ignore[arg-type]
+            "Push: interval is 3.0; give the shortest and the longest time",
+        ),
         (lambda: Observed("a", 0, 1, history=0), "observation `a`: history"),
     ],
 )

@@ -21,7 +21,7 @@ KINDS = {
 }
 
 
-def ball_scene(ground: terrain.Terrain, **surface: float) -> tl.Scene:
+def ball_scene(ground: terrain.Terrain, **surface: Any) -> tl.Scene:
     scene = tl.Scene(dt=0.002, substeps=5)
     ground.add_to(scene, **surface)
     scene.add_body(name="ball", pos=(0, 0, 1), mass=1.0)
@@ -111,7 +111,7 @@ def test_contacts_are_the_same_far_from_the_origin() -> None:
         q = np.zeros((200, 7), np.float32)
         # places that f32 has at both distances
         q[:, :2] = np.round(rng.uniform(-3, 3, (200, 2)) * 1024) / 1024
-        q[:, 2] = ground.height(q[:, 0], q[:, 1]) + np.round(rng.uniform(0, 0.1, 200) * 1024) / 1024
+        q[:, 2] = ground.height(*q[:, :2].T.astype(float)) + np.round(rng.uniform(0, 0.1, 200) * 1024) / 1024
         q[:, 2], q[:, 6] = np.round(q[:, 2] * 1024) / 1024, 1
         q[:, 0] += far
         q[:, 1] -= far
@@ -183,7 +183,7 @@ def test_a_saved_scene_has_its_field_and_its_scan(tmp_path: Path) -> None:
     scene.save(tmp_path / "hills.toml")
     again = tl.Scene.load(tmp_path / "hills.toml")
     field = again.shapes["terrain"]
-    assert field.path == tmp_path / "hills_fields" / "terrain.npy" and field.mu == 0.7
+    assert field.path is not None and field.path == tmp_path / "hills_fields" / "terrain.npy" and field.mu == 0.7
     np.testing.assert_array_equal(np.load(field.path), KINDS["stairs"].elevation)
     eyes, own = again.height_scans["eyes"], scene.height_scans["eyes"]
     assert eyes.counts == own.counts and eyes.reach == own.reach

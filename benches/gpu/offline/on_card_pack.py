@@ -21,6 +21,7 @@ import shutil
 import subprocess
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -125,10 +126,11 @@ def pack(scene: Scene, frames: list[int], folder: Path, cache: Path) -> None:
         "model": states,
     }
     (folder / "facts.json").write_text(json.dumps(facts, indent=1))
-    tables = {"numbers": scene.table("numbers"), "indices": scene.table("indices")}
+    tables: dict[str, Any] = {"numbers": scene.table("numbers"), "indices": scene.table("indices")}
     for frame in frames:
         after = scene.state("after", frame)[::STRIDE, : scene.facts["moving"]]
-        np.savez_compressed(folder / f"{frame}.npz", before=scene.state("before", frame), after=after, **tables)
+        arrays: dict[str, Any] = {"before": scene.state("before", frame), "after": after}
+        np.savez_compressed(folder / f"{frame}.npz", **arrays, **tables)
 
 
 def main() -> None:

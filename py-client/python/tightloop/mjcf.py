@@ -94,7 +94,7 @@ class _Writer:
         name, joint = f"{robot['name']}/{link['name']}", link["joint"]
         parent = None if joint is None else joint["parent"]
         carrier, place = self.world, robot if joint is None else joint
-        if parent is not None and joint["kind"] != "free":
+        if joint is not None and parent is not None and joint["kind"] != "free":
             carrier = self.bodies[f"{robot['name']}/{parent}"]
         body = self.bodies[name] = SubElement(carrier, "body", name=name)
         if joint is not None and joint["kind"] == "free":
@@ -194,7 +194,7 @@ class _Writer:
             own.set("polycoef", _words((tie["offset"], tie["multiplier"], 0.0, 0.0, 0.0)))
 
     def _drives(self) -> list[float]:
-        """Add the actuators; returns what they are told at the start."""
+        """Add the actuators; returns their controls at the start."""
         actuators, controls = SubElement(self.root, "actuator"), []
         for dof, (facts, name) in enumerate(zip(self.scene["dofs"], self.scene["dof_names"], strict=True)):
             ke, kd = facts["ke"], facts["kd"]

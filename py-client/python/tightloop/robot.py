@@ -54,12 +54,16 @@ class Robot(Entity):
     joint_target_qd = Numbers(
         "Velocity targets of the drives at the start [rad/s or m/s], shape ``(dofs,)``.", follows=velocity
     )
-    joint_target_mode = Modes(
+    joint_target_mode: Modes = Modes(
         "Drive law of each dof: ``position``: ke (q* − q) − kd q̇; ``velocity``: kd (q̇* − q̇); ``both``: their sum."
     )
-    joint_target_ke = Numbers("Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False)
-    joint_target_kd = Numbers("Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False)
-    joint_effort_limit = Numbers(
+    joint_target_ke: Numbers = Numbers(
+        "Proportional gains of the drives [N·m/rad or N/m], shape ``(dofs,)``.", signed=False
+    )
+    joint_target_kd: Numbers = Numbers(
+        "Derivative gains of the drives [N·m·s/rad or N·s/m], shape ``(dofs,)``.", signed=False
+    )
+    joint_effort_limit: Numbers = Numbers(
         "Limit of a joint's drive force [N·m or N], shape ``(dofs,)``; inf is no limit. It does not limit ``joint_f``.",
         signed=False,
         limit=True,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import ChainMap
 from collections.abc import Collection, Container
 from typing import TYPE_CHECKING, Any
 
@@ -357,7 +356,7 @@ class SceneShapes(SceneOptions):
         return thing
 
     def _names(self) -> Collection[str]:
-        return ChainMap(self.robots, self.models, self.bodies, self.shapes)
+        return {**self.shapes, **self.bodies, **self.models, **self.robots}
 
     def _free_name(self, kind: str) -> str:
         name, self._numbers[kind] = numbered(kind, self._names(), self._numbers.get(kind, 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +61,8 @@ class FileScene(DemoScene):
                 target[:, place] = multiplier * target[:, lead] + offset
             commands[name] = np.ascontiguousarray(target)
         ctrl = {name: middle + wave * reach for name, (middle, reach) in self._ranges.items()}
-        given = {"joint_target_q": commands} if commands else {}
-        self.frame = self.sim.step(**given, **({"ctrl": ctrl} if ctrl else {}))
+        given: dict[str, Any] = {"joint_target_q": commands, "ctrl": ctrl}
+        self.frame = self.sim.step(**{name: values for name, values in given.items() if values})
         self._faulted = int(np.count_nonzero(self.frame.status & 9))
 
     def summary(self) -> str:

@@ -29,8 +29,8 @@ class Commands:
             self.start[names.dofs[name]] = robot.joint_target_q
             self.range[names.dofs[name]] = robot.joint_range
             for own, leader, multiplier, offset in robot._followers:
-                places = (names.dof(f"{name}/{joint}") for joint in (own, leader))
-                self._followers.append((*places, multiplier, offset))
+                follower, place = names.dof(f"{name}/{own}"), names.dof(f"{name}/{leader}")
+                self._followers.append((follower, place, multiplier, offset))
         self._worlds = worlds
         self._names, self._actuators = names.dof_names, names.actuator_names
         self._arrays: dict[str, NDArray[np.float32]] = {}
@@ -65,7 +65,9 @@ class Commands:
     def sent(self) -> dict[str, NDArray[np.float32]]:
         """Arguments of a step, by name. Mimic joints that no control moves follow their leaders."""
         targets = self._arrays.get("joint_target_q")
-        for own, leader, multiplier, offset in self._followers if targets is not None else ():
+        if targets is None:
+            return self._arrays
+        for own, leader, multiplier, offset in self._followers:
             if ("joint_target_q", leader) in self._taken and ("joint_target_q", own) not in self._taken:
                 targets[:, own] = multiplier * targets[:, leader] + offset
         return self._arrays

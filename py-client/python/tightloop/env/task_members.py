@@ -80,7 +80,9 @@ def tell_of_attributes(task: Any, base: type) -> None:
 def _tell(task: type, base: type, members: dict[str, Any]) -> None:
     # of a Task, and of the task of this package that it is made of
     bases = [own for own in task.__mro__ if own is base or own.__module__.startswith("tightloop.")]
-    known = {name: callable(value) for own in bases for name, value in vars(own).items() if name[0] != "_"}
+    known: dict[str, bool] = {
+        name: callable(value) for own in bases for name, value in vars(own).items() if name[0] != "_"
+    }
     used: set[str] | None = None
     for name, value in members.items():
         if name[0] == "_" or name in known or isinstance(value, type):
