@@ -108,6 +108,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "hull_fans",
             "hull_tables",
             "model",
+            "hash",
             "compile",
         ],
     ),

@@ -17,6 +17,7 @@
 //! | `ray_scene` | what rays meet in many worlds |
 //! | `urdf`, `mujoco`, `rigid_body` | robots from files; bodies of one link |
 //! | `hull_fans`, `hull_tables`, `model` | the kernel source's tables of hulls; the result |
+//! | `hash` | the text that a model's hash is of |
 //! | `compile` | from a description to a model |
 
 mod cache_files;
@@ -28,6 +29,7 @@ mod error;
 pub mod files;
 mod geom_contact;
 pub mod geometry;
+mod hash;
 mod hull_fans;
 pub mod hull_tables;
 mod inertia;

@@ -4,11 +4,7 @@ use crate::description::ParamDraw;
 use crate::distribution::Distribution;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
-use sim_physics::constants::contact::FrictionCombine;
-use sim_physics::constants::height_field::FieldTables;
-use sim_physics::constants::mujoco::Mujoco;
 use sim_physics::constants::scan::HeightScan;
-use sim_physics::lane::{Fixed, Table};
 use std::ops::Range;
 
 /// Where a robot's rows lie in the arrays of the scene.
@@ -246,88 +242,4 @@ impl Model {
     pub fn hash(&self) -> u64 {
         self.hash
     }
-
-    /// FNV-1a over everything that a run depends on.
-    ///
-    /// It covers the `Debug` text, so names of types and fields in it are part of every recording.
-    pub(crate) fn own_hash(&self) -> u64 {
-        let text = format!(
-            "{:?} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {}",
-            self.constants,
-            self.dt,
-            self.substeps,
-            self.dof_names,
-            self.body_names,
-            self.start,
-            self.shape_names,
-            self.site_names,
-            self.contact_sensors,
-            self.command_delay_max
-        );
-        let text = text.replace(
-            &self.constants.varying.listed(),
-            &self.constants.varying.listed_in_recordings(),
-        );
-        // recordings are older than what models from MuJoCo have
-        let text = text.replace(&format!(", mujoco: {:?}", Mujoco::<f64>::default()), "");
-        let text = text
-            .replace(", mocap_pos: [], mocap_quat: [], eq_active: []", "")
-            .replace(", scans: []", "")
-            .replace(", search: None", "")
-            .replace(DEFAULT_SEARCH, "")
-            .replace(", turns: None", "")
-            .replace(", mujoco_capsule_boxes: false", "")
-            .replace(", link_axes: None", "")
-            .replace(&format!(", turning: {:?}", Fixed::default()), "")
-            .replace(&no_fans(), "")
-            .replace(&no_clusters(), "")
-            .replace(&no_fields()[0], "")
-            .replace(&no_fields()[1], "")
-            .replace(&largest_friction(), "");
-        text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
-            (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
-        })
-    }
-}
-
-/// What the `Debug` text of a model from MuJoCo says where its line search has MuJoCo's defaults.
-const DEFAULT_SEARCH: &str =
-    ", search: Some(Search { ls_tolerance: 0.01, islands: true, warm_start: true })";
-
-/// What the `Debug` text of a model says where the larger friction of two shapes counts.
-fn largest_friction() -> String {
-    let (combine, none) = (FrictionCombine::Max, Fixed::default());
-    format!(", combine: {combine:?}, keeps_max: {none:?}")
-}
-
-/// What the `Debug` text of a model says where it has no height field.
-fn no_fields() -> [String; 2] {
-    let (fields, candidates) = (
-        FieldTables::default(),
-        Table {
-            base: 0,
-            stride: 1,
-            rows: 0,
-        },
-    );
-    [
-        format!(", fields: {fields:?}"),
-        format!(
-            ", field_candidates: {candidates:?}, field_cells: {candidates:?}, field_prisms: {candidates:?}"
-        ),
-    ]
-}
-
-/// What the `Debug` text of a model says where no plane touches hulls as in MuJoCo.
-fn no_fans() -> String {
-    let none = Fixed::default();
-    format!(
-        ", ranks: {none:?}, fan_spans: {none:?}, fan_sizes: {none:?}, fans: {none:?}, origins: {none:?}"
-    )
-}
-
-/// What the `Debug` text of a model says where no hull has clusters of vertices.
-fn no_clusters() -> String {
-    let none = Fixed::default();
-    format!(", cluster_spans: {none:?}, cluster_rows: {none:?}, clusters: {none:?}")
 }

@@ -16,6 +16,7 @@ use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 
+mod earlier;
 mod gaps;
 
 const WORLDS: usize = 3;
@@ -191,7 +192,7 @@ fn a_cut_recording_replays_to_its_last_whole_frame() {
 }
 
 #[test]
-fn a_file_that_ends_before_its_state_is_told() {
+fn a_file_that_ends_before_its_state_is_reported() {
     let (bytes, ends) = record().bytes();
     let path = file("stateless");
     for length in [blocks::HEAD, ends[0], ends[1] - 1] {
@@ -240,7 +241,7 @@ fn a_damaged_recording_is_replayed_up_to_there() {
 }
 
 #[test]
-fn a_forged_command_is_told_by_frame_world_and_field() {
+fn a_forged_command_is_reported_by_frame_world_and_field() {
     let mut recording = record();
     let place = torques().rows()[0].offset / 4 + DOFS + 2; // third dof of world 1
     let numbers: &mut [f32] = bytemuck::cast_slice_mut(recording.frame(5));
@@ -259,10 +260,10 @@ fn a_forged_command_is_told_by_frame_world_and_field() {
 }
 
 #[test]
-fn a_forged_frame_is_told_by_frame_world_and_field() {
+fn a_forged_frame_is_reported_by_frame_world_and_field() {
     let digests = torques().total_bytes() / 8;
     let mut recording = record();
-    // one digest a world of joint_q, then of joint_qd
+    // one digest per world of joint_q, then of joint_qd
     let numbers: &mut [u32] = bytemuck::cast_slice_mut(&mut recording.frame(3)[digests..]);
     numbers[WORLDS + 2] ^= 1;
     let message = recording.replay("digest").unwrap_err().to_string();

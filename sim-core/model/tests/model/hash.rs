@@ -1,7 +1,7 @@
 //! The hash of a model stays what it was: recordings store it and refuse to replay on a model with another one.
 //!
-//! The hash covers the `Debug` text of the constants. A renamed field or type in that text changes every hash, and so
-//! makes every recording unreadable.
+//! `sim-core/model/src/hash` writes the text that the hash is of. A key or a word that changes there changes every hash, and
+//! so makes every recording unreadable. `sim-daemon/src/recording/tests/earlier.rs` replays recordings of an earlier release.
 
 use std::path::Path;
 

@@ -6,7 +6,6 @@ use super::hull::HullTables;
 use super::pair_groups::Group;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
-use std::fmt;
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -136,7 +135,7 @@ impl FrictionCombine {
 }
 
 /// Tables of the model.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Handles {
     /// Scalars of a pair; see [`pair`].
     pub pair_numbers: Fixed,
@@ -149,17 +148,6 @@ pub struct Handles {
     pub pair_blocks: Fixed,
 }
 
-// models are told apart by their `Debug` text, and blocks are no part of a model
-impl fmt::Debug for Handles {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Handles")
-            .field("pair_numbers", &self.pair_numbers)
-            .field("pair_indices", &self.pair_indices)
-            .field("class_rows", &self.class_rows)
-            .finish()
-    }
-}
-
 /// Scratch tables.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
@@ -169,7 +157,7 @@ pub struct Memory {
     pub origins: Table,
     /// Contacts of each class; then contacts, rows, and contacts left out of the world.
     pub counts: Table,
-    /// A row a contact; see [`row`].
+    /// A row per contact; see [`row`].
     pub rows: Table,
     /// Scratch of the narrow phase of faces.
     pub cut: Cut,

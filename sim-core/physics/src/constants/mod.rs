@@ -276,7 +276,7 @@ recast! {
 
 recast! {
     /// MuJoCo's `solimp`: impedance rises from `d_min` at 0 to `d_max` at `width`, along two curves that meet at `midpoint`.
-    #[derive(Clone, Copy, PartialEq)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Impedance<R> {
         /// At the constraint's surface [–].
         pub d_min: R,
@@ -288,22 +288,6 @@ recast! {
         pub midpoint: R,
         /// Their exponent: 1 for a line, 2 for parabolas [–].
         pub power: R,
-    }
-}
-
-impl<R: std::fmt::Debug> std::fmt::Debug for Impedance<R> {
-    /// Shows the exponent only where it is not 2: the text is part of the model's hash, which is older than the exponent.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let mut text = f.debug_struct("Impedance");
-        text.field("d_min", &self.d_min)
-            .field("d_max", &self.d_max)
-            .field("inverse_width", &self.inverse_width)
-            .field("midpoint", &self.midpoint);
-        let power = format!("{:?}", self.power);
-        if power != "2.0" {
-            text.field("power", &self.power);
-        }
-        text.finish()
     }
 }
 
@@ -364,7 +348,7 @@ recast! {
     pub struct Newton<R> {
         /// Most iterations.
         pub iterations: usize,
-        /// Most line-search evaluations an iteration.
+        /// Most line-search evaluations per iteration.
         pub ls_iterations: usize,
         /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
         pub tolerance: R,

@@ -111,7 +111,7 @@ impl<R> Default for Mujoco<R> {
 
 recast! {
     /// Options of MuJoCo's solver, and the parts that it may solve one by one.
-    #[derive(Clone)]
+    #[derive(Clone, Debug)]
     pub struct Search<R> {
         /// Improvement, gradient and expected gain below which an island ends, over the trace of its mass matrix.
         pub tolerance: R,
@@ -130,17 +130,6 @@ impl<R> Search<R> {
     /// The first dofs of trees, after which islands are named.
     pub fn islands_of(&self, dofs: usize) -> impl Iterator<Item = usize> + '_ {
         (0..dofs).filter(|&dof| self.roots[dof] == dof)
-    }
-}
-
-impl<R: std::fmt::Debug> std::fmt::Debug for Search<R> {
-    /// Shows what is not derived from other constants: the text is part of the model's hash.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Search")
-            .field("ls_tolerance", &self.ls_tolerance)
-            .field("islands", &self.islands)
-            .field("warm_start", &self.warm_start)
-            .finish()
     }
 }
 

@@ -192,23 +192,7 @@ pub struct Varying {
     starts: Vec<(Param, f64)>,
 }
 
-/// Parameters that the first recordings know.
-const RECORDED: usize = 22;
-
 impl Varying {
-    /// How `Debug` shows which parameters vary.
-    pub fn listed(&self) -> String {
-        format!("first: {:?}", self.first)
-    }
-
-    /// The same as recordings know it, unless newer parameters vary.
-    pub fn listed_in_recordings(&self) -> String {
-        match self.first[RECORDED..].iter().any(Option::is_some) {
-            true => self.listed(),
-            false => format!("first: {:?}", &self.first[..RECORDED]),
-        }
-    }
-
     /// Adds a parameter with its initial values.
     pub fn add(&mut self, param: Param, numbers: impl IntoIterator<Item = f64>) {
         self.first[param as usize] = Some(self.starts.len());

@@ -103,6 +103,63 @@ pub(super) struct Path<'a> {
 }
 
 impl Pattern {
+    /// Its layout in the text that a model's hash is of: names, keys and order are those of recordings, whatever they are here.
+    pub fn layout_text(&self) -> String {
+        let Pattern {
+            blocks,
+            starts,
+            places,
+            len,
+            block_of,
+            run_starts,
+            runs,
+            path_bounds,
+            path_rows,
+            path_starts,
+            segments,
+        } = self;
+        let blocks = blocks.iter().map(|block| {
+            let Block {
+                first,
+                size,
+                offset,
+                len,
+                kind,
+                segments,
+            } = block;
+            let kind = match kind {
+                Kind::Dense => "Dense",
+                Kind::Tree => "Tree",
+                Kind::General => "General",
+            };
+            format!(
+                "Block {{ first: {first}, size: {size}, offset: {offset}, len: {len}, kind: {kind}, segments: {segments:?} }}"
+            )
+        });
+        let runs =
+            (runs.iter()).map(|Run { start, end }| format!("Run {{ start: {start}, end: {end} }}"));
+        let segments = segments.iter().map(|segment| {
+            let Segment {
+                first,
+                size,
+                start,
+                end,
+            } = segment;
+            format!("Segment {{ first: {first}, size: {size}, start: {start}, end: {end} }}")
+        });
+        let [blocks, runs, segments] = [
+            blocks.collect::<Vec<_>>(),
+            runs.collect(),
+            segments.collect(),
+        ]
+        .map(|parts| parts.join(", "));
+        format!(
+            "Pattern {{ blocks: [{blocks}], starts: {starts:?}, places: {places:?}, len: {len}, block_of: {block_of:?}, \
+             run_starts: {run_starts:?}, runs: [{runs}], path_bounds: {path_bounds:?}, path_rows: {path_rows:?}, \
+             path_starts: {path_starts:?}, segments: [{segments}] }}"
+        )
+    }
+
     /// The pattern of a matrix with these off-diagonal entries (either triangle), with its fill.
     pub fn new(size: usize, entries: impl IntoIterator<Item = (usize, usize)>) -> Pattern {
         let mut rows = vec![BTreeSet::new(); size];
