@@ -1,14 +1,12 @@
 //! The house rules of ARCHITECTURE.md and STYLE.md that a machine can check.
 
 mod law;
+mod length;
 
 use law::{DOORS, ORDER, UNSAFE};
 use sim_physics::arrays::Field;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-
-/// Longest page of code [lines].
-const LONGEST: usize = 500;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -343,43 +341,6 @@ fn every_field_has_a_name_a_unit_and_a_line_of_text() {
         );
         assert_eq!(Field::named(row.name), Some(*field));
     }
-}
-
-#[test]
-fn pages_of_code_are_at_most_500_lines() {
-    let python = [
-        "py-client/python",
-        "tests/python",
-        "examples",
-        "benches",
-        "docs/generate",
-    ];
-    let rust = [
-        "tests",
-        "benches",
-        "examples",
-        "sim-core/physics/tests",
-        "sim-core/model/tests",
-        "sim-core/record/tests",
-        "sim-core/engine/tests",
-        "sim-core/device/benches",
-        "sim-core/device/tests",
-        "sim-daemon/tests",
-        "sim-daemon/client-c/tests",
-    ];
-    let long: Vec<String> = python
-        .iter()
-        .flat_map(|folder| files(folder, ""))
-        .filter(|path| path.ends_with(".py"))
-        .chain(
-            rust.iter()
-                .flat_map(|f| files(f, ""))
-                .filter(|path| path.ends_with(".rs")),
-        )
-        .chain(sources())
-        .filter(|path| read(path).lines().count() > LONGEST)
-        .collect();
-    assert!(long.is_empty(), "{long:?}");
 }
 
 #[test]
