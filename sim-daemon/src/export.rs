@@ -1,4 +1,4 @@
-//! Between physics and protocol: the only file that knows both sim-core and sim-protocol.
+//! From a simulation to the protocol and back: its description, its frames, and commands that a client sends.
 
 use sim_engine::backend::sharing::SharedMemory;
 use sim_engine::backend::{Input, Values};

@@ -1,9 +1,10 @@
-//! Commands of a simulation: `joint_f`, `joint_target_q`, `joint_target_qd` and, where the run has it, `body_f`.
+//! Commands of a simulation: the fields of [`Group::Command`] and, where the run has it, `body_f`.
 //!
-//! All commands take the same road: [`Simulation::command`] checks the array, writes the worlds whose values are finite, and freezes
-//! the others where the run says so. A command holds until it is set again or the world is reset.
+//! [`Simulation::command`] checks the array, writes the worlds whose values are finite, and freezes
+//! the others where the run is set to freeze them. A command holds until it is set again or the world is reset.
 //!
-//! The joint commands act with the world's command delay and carry noise. `body_f` is a load, which is a parameter that acts at once.
+//! `joint_f` and the joint targets act with the world's command delay and carry noise; the other fields act at once. `body_f` is a
+//! load: a parameter that acts at once.
 
 use crate::backend::{BackendError, Input, Values};
 use crate::simulation::Simulation;

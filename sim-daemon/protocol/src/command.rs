@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::header::encode_row;
 use crate::{ALIGNMENT, Description, Dtype, InputInfo, Op, ProtocolError, ROWS_MAX, Table};
 
-/// Name of the mask in a command: a byte a world.
+/// Name of the mask in a command: a byte per world.
 pub(crate) const MASK: &str = "mask";
 /// Name of a snapshot's path in a command: bytes of UTF-8.
 pub(crate) const PATH: &str = "path";
@@ -45,9 +45,9 @@ impl Values<'_> {
 /// One array that a step or a write sets.
 #[derive(Debug, Clone)]
 pub struct Command<'a> {
-    /// `joint_f`, `joint_target_q`, `joint_target_qd` for a step; `joint_q`, `joint_qd` for a write.
+    /// Its name: one of [`Description::commands`] for a step, of [`Description::writes`] for a write.
     pub field: &'a str,
-    /// Dofs (or coordinates for `joint_q`) that the array covers.
+    /// Columns of the input that the array covers, such as dofs.
     pub columns: Range<usize>,
     /// The numbers, `(worlds, columns)`.
     pub values: Values<'a>,
@@ -69,7 +69,7 @@ pub(crate) struct Call<'a> {
     pub(crate) mask: Option<&'a [bool]>,
     pub(crate) path: Option<&'a str>,
     pub(crate) from_world: Option<u64>,
-    /// One for all worlds, or one a world.
+    /// One for all worlds, or one per world.
     pub(crate) seed: Option<&'a [u64]>,
     pub(crate) on_device: Option<OnDevice>,
 }

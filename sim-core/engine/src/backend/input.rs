@@ -1,4 +1,4 @@
-//! Arrays that a caller sets: the one road of states, commands and parameters into a backend.
+//! Arrays that a caller sets: how states, commands and parameters reach a backend.
 
 use super::Precision;
 use super::state::array_of;
@@ -11,8 +11,8 @@ use std::ops::Range;
 
 /// An array that a caller sets: part of the state, a command, or a parameter that varies between worlds.
 ///
-/// Commands are `joint_f`, `joint_target_q`, `joint_target_qd` and, where the run has it, `body_f`. The first three act with the
-/// world's command delay. `body_f` is a load: a parameter that acts at once and that a reset clears.
+/// Commands are the fields of [`Group::Command`] and, where the run has it, `body_f`. `joint_f` and the joint targets act with the
+/// world's command delay, the other fields at once. `body_f` is a load: a parameter that acts at once and that a reset clears.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
     /// A field of the group [`Group::State`] or [`Group::Command`].

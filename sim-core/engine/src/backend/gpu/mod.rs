@@ -1,4 +1,4 @@
-//! The GPU backend: worlds live in device memory, and a control frame is one recorded batch. Sole user of sim-device.
+//! The GPU backend: worlds live in device memory, and a control frame is one recorded batch.
 //!
 //! # Programs
 //! The physics code is recorded for the model (`programs`). Where nothing touches, all substeps are one recording; otherwise one

@@ -1,8 +1,9 @@
 //! One world per lane of an x86 register: [`F32x8`] (AVX2) and [`F32x16`] (AVX-512).
 //!
-//! SAFETY of every intrinsic here: the types are used only below a function that enables their
-//! target features (`backend/cpu/dispatch.rs`), after a check that the processor has them;
-//! everything above is `#[inline(always)]`, so that it inherits the features.
+//! SAFETY of every intrinsic here: the types are used only below functions that enable their target features: a stage's
+//! (`physics/src/compiled.rs`), a frame's (`engine/src/backend/cpu/dispatch.rs`) and an inverse problem's
+//! (`ik/src/dispatch.rs`). Each runs after a check that the processor has them. What they call is `#[inline(always)]`, so
+//! that it inherits the features.
 #![allow(clippy::undocumented_unsafe_blocks)] // one proof serves all blocks: the module's documentation
 
 use crate::lane::{Lane, Num};
