@@ -3,8 +3,8 @@
     pip install onnxruntime
     python benches/climbing.py examples/trained/QuadrupedVelocityRough.onnx
 
-Each of 128 robots starts in the middle of a tile and is told to walk ahead with 0.6 m/s for 12 s, in a direction of its
-own. It crosses the tile if it comes 3.2 m away from its start.
+Each of 128 robots starts in the middle of a tile and has to walk ahead with 0.6 m/s for 12 s, in its own direction.
+It crosses the tile if it comes 3.2 m away from its start.
 """
 
 from __future__ import annotations

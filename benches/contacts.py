@@ -8,11 +8,12 @@ machine that changes its speed meanwhile changes both; ratios are taken within a
 benches/results/MACHINE/contacts.csv, and ends with 1 when a recorded demo is slower than asked, where there is AVX-512.
 
 Like with like: one URDF file, time step, solver, cone and impratio, pairs of shapes and their softness, commands and
-starts. With "one" all worlds are alike, as in the record, and the worlds of a register stay together; with "own" the
-torques' amplitude, the cube's place, or the targets are each world's own. Not the same: MuJoCo computes in double
-precision, tightloop in single; MuJoCo's worlds are fewer; its meshes keep all vertices of their hulls, tightloop's at
-most 64, and it finds other points on those (of boxes the same). Where the published meshes and the recorded models are
-not beside the repository, both sides take the project's own URDF, whose links are boxes, cylinders and spheres.
+starts. With "one" all worlds get identical commands, as in the record, and the worlds of a register stay together.
+With "own" the torques' amplitude, the cube's place, or the targets are each world's own. Not the same: MuJoCo
+computes in double precision, tightloop in single; MuJoCo's worlds are fewer; its meshes keep all vertices of their
+hulls, tightloop's at most 64, and it finds other points on those (of boxes the same). Where the published meshes and
+the recorded models are not beside the repository, both sides take the project's own URDF, whose links are boxes,
+cylinders and spheres.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ SWING, FREQUENCIES, FINGERS = 0.1, (0.2, 1.0), 0.04
 
 @dataclass(frozen=True)
 class Case:
-    """A demo, whether its worlds are alike, and how many times as fast as MuJoCo it is asked to be."""
+    """A demo, whether its worlds get identical commands, and how many times as fast as MuJoCo it is asked to be."""
 
     demo: str
     worlds: str

@@ -2,7 +2,7 @@
 
 The URDF file, drives, limits, shapes, pairs that touch and their softness, solver, time step and substeps are those of
 `tightloop.tasks.pick_cube`, and so are actions, observations and rewards, in NumPy. Not the same: double precision; and
-the forces on the fingers are those at the beginning of the last substep, which saves an evaluation a step.
+the forces on the fingers are those at the beginning of the last substep, which saves an evaluation per step.
 """
 
 from __future__ import annotations

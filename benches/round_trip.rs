@@ -1,4 +1,4 @@
-//! One world: what a step costs in process, and what the wire adds to it.
+//! One world: what a step costs in process, and what the protocol adds to it.
 //!
 //! Measures both in turns, so that a machine that changes its speed meanwhile changes both. Prints one line of JSON with
 //! the percentiles in process, under `wire` those through a daemon, under `daemon_busy` the daemon's part of them; `benches/round_trip.py` adds Python to it.

@@ -3,7 +3,7 @@
     python benches/soak.py --hours 1
 
 Prints a line per sample: memory, descriptors and threads of both sides, files in shared memory, and how long a step
-takes. Writes the samples into benches/results, unless told not to. Ends with 1 when memory or descriptors grow: when
+takes. Writes the samples into benches/results without ``--dry-run``. Ends with 1 when memory or descriptors grow: when
 the last quarter of the samples has more than the second one.
 """
 

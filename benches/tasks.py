@@ -4,7 +4,7 @@
 
 The worlds are those of an environment after some random actions; its functions are called as it does itself, on arrays
 whose temporaries lie in its arena, and the observation is packed into one array. The least of many rounds counts, since
-other work on the machine only adds; the median is told beside it. `most_kb` is the most that a call takes beyond that
+other work on the machine only adds; the median stands beside it. `most_kb` is the most that a call takes beyond that
 arena: NumPy's own buffers. Writes benches/results/MACHINE/tasks.csv, and ends with 1 when a task is slower than asked.
 """
 

@@ -47,7 +47,7 @@ def report(task: str, progress: str, found: Mapping[str, float]) -> None:
     """
     if sys.stdout.isatty() and sys.stderr.isatty():
         return
-    # whoever follows a file or a pipe sees each line at once
+    # a reader of a file or a pipe sees each line at once
     print(f"{task}, {progress}: {', '.join(f'{name} {value}' for name, value in told(found).items())}", flush=True)
 
 

@@ -88,7 +88,7 @@ fn worlds_of_one_seed_are_alike_wherever_they_are() {
 }
 
 #[test]
-fn one_seed_for_all_makes_all_worlds_alike_and_so_does_a_launch() {
+fn one_seed_for_all_makes_all_worlds_equal_and_so_does_a_launch() {
     let model = scene().compile().unwrap();
     let mut run = Run::new(
         &model,

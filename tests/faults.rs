@@ -277,7 +277,7 @@ fn a_daemon_that_is_asked_to_end_does_so_at_once_and_leaves_nothing() {
 }
 
 #[test]
-fn an_old_client_is_told_of_a_restart_and_does_not_disturb_the_new_daemon() {
+fn an_old_client_learns_of_a_restart_and_does_not_disturb_the_new_daemon() {
     let name = unique("restart");
     let mut first = Daemon::start_as(&name, &scene(), &[]);
     let old = first.attach();

@@ -244,7 +244,7 @@ fn run_own(
 }
 
 #[test]
-fn worlds_with_parameters_of_their_own_equal_runs_of_one_world() {
+fn worlds_with_independent_parameters_equal_runs_of_one_world() {
     let model = arm(Param::ALL).compile().unwrap();
     let seeds: Vec<usize> = (0..35).collect();
     for precision in [Precision::F32, Precision::F64] {

@@ -351,7 +351,7 @@ fn a_world_whose_rotation_is_lost_is_frozen_and_a_write_leaves_its_rotations_alo
     }
     let model = scene.compile().unwrap();
     for (lanes, precision) in machines() {
-        // spins from those that a step survives to those whose square is infinite, one a world
+        // spins from those that a step survives to those whose square is infinite, one per world
         let most = blow(precision).log10();
         let spins: Vec<f64> = (0..WORLDS)
             .map(|world| 10f64.powf(most * world as f64 / WORLDS as f64))

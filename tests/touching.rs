@@ -211,7 +211,7 @@ fn rows_of(cone: Cone) -> usize {
 }
 
 #[test]
-fn worlds_that_exceed_their_room_say_so_and_the_others_are_bitwise_unchanged() {
+fn worlds_that_exceed_their_room_report_it_and_the_others_are_bitwise_unchanged() {
     let seeds: Vec<usize> = (0..67).collect();
     for cone in [Cone::Elliptic, Cone::Pyramidal] {
         let roomy = shapes(cone).compile().unwrap();

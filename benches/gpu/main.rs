@@ -33,7 +33,7 @@ use std::time::{Duration, Instant};
 /// What a frame shows while it is measured.
 const FIELDS: [Field; 3] = [Field::JointQ, Field::JointQd, Field::BodyQ];
 
-/// Worlds with which replay is compared: so few that commands and counters cost next to nothing beside the batches.
+/// Worlds with which replay is compared: so few that commands and counters cost little beside the batches.
 const REPLAY_WORLDS: usize = 64;
 
 /// Where worlds are kept: an adapter, with a folder for its programs, and how those are made.

@@ -9,7 +9,7 @@ device, 8 steps as one recorded graph or one compiled function, then joint posit
 arrays of the host. Columns are those of run.sh, besides the device, the commit and the date.
 
 Like with like: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0. Not
-the same: all worlds are alike here, cubes and commands, and contacts are found by each engine's own means.
+the same: all worlds are identical here, cubes and commands, and contacts are found by each engine's own means.
 """
 
 from __future__ import annotations

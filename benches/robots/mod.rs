@@ -65,7 +65,7 @@ impl Case {
     }
 }
 
-/// Targets of a frame [rad], one a dof; those of the free base are not used.
+/// Targets of a frame [rad], one per dof; those of the free base are not used.
 pub fn targets(robot: &Robot, frame: usize) -> Vec<f64> {
     let seconds = frame as f64 / 50.0;
     let mut targets = Vec::new();

@@ -366,7 +366,7 @@ machines were busy.
 installed.
 
 - The same: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0.
-- Not the same: all of their worlds are alike, and each engine finds contacts by its own means.
+- Not the same: all of their worlds are identical, and each engine finds contacts by its own means.
 - `cold` includes compiling where the kernels were not kept. The first grasp of all did not end within 150 s.
 """,
         {

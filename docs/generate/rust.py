@@ -1,4 +1,4 @@
-"""Structs and enums of the Rust sources: names, types, doc comments, what serde is told."""
+"""Structs and enums of the Rust sources: names, types, doc comments, attributes of serde."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a planner is told: a scene, what it may command, what it costs, and how a run of it is judged."""
+"""What a planner gets: a scene, what it may command, what it costs, and how a run of it is judged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-//! What a running simulation is given and is most likely a mistake, and worlds that fault: each is told once, with the
+//! What a running simulation is given and is most likely a mistake, and worlds that fault: each is reported once, with the
 //! cure, by `tightloop.advice`.
 
 use std::f64::consts::{PI, TAU};
@@ -26,7 +26,7 @@ const NOISE: f64 = PI;
 /// No turn, as libraries write it that put w last, or first; each is a half turn in the other order.
 const NO_TURN: [[f64; 4]; 2] = [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]];
 
-/// What was told already; a bit each.
+/// What was reported already; a bit each.
 #[derive(Clone, Copy)]
 enum Told {
     Targets = 1,
@@ -39,13 +39,13 @@ enum Told {
     Followers = 128,
 }
 
-/// What is looked at, and what was told already.
+/// What is looked at, and what was reported already.
 pub(crate) struct Advice {
     told: AtomicU8,
     calls: AtomicU32,
     /// Targets were sent.
     aims: AtomicBool,
-    /// A mocap body got a rotation that is none in either order: whoever sends it knows the order.
+    /// A mocap body got a rotation that is none in either order, so its order is known.
     turned: AtomicBool,
     /// Commands that are not finite are looked for, since they fault their world alone.
     spoils: bool,
@@ -241,7 +241,7 @@ impl Advice {
         self.told.load(Ordering::Relaxed) & what as u8 != 0
     }
 
-    /// Whether something was not told before; then it is now.
+    /// Whether something was not reported before; then it is now.
     fn is_new(&self, what: Told) -> bool {
         self.told.fetch_or(what as u8, Ordering::Relaxed) & what as u8 == 0
     }

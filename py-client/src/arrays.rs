@@ -34,7 +34,7 @@ macro_rules! number {
 number!(f32 f64);
 
 /// Write parts, each `(worlds,)` or `(worlds, columns)`, side by side into `out`, `(worlds, size)`, of `f32` or `f64`; numbers below
-/// `low` or above `high`, one a column, count as these. NaN stays NaN. Returns whether there is any.
+/// `low` or above `high`, one per column, count as these. NaN stays NaN. Returns whether there is any.
 #[pyfunction]
 pub(crate) fn pack(
     py: Python<'_>,
@@ -172,7 +172,7 @@ fn place<T: Element + Copy, O: Number>(
 }
 
 /// Commands from actions: column k of `out`, from `first` on, becomes `base + scale * action`, within `low` and `high`, one a
-/// column of `action`. The base is `start`, one a column, or without it what stands there. NaN stays NaN.
+/// column of `action`. The base is `start`, one per column, or without it what stands there. NaN stays NaN.
 #[pyfunction]
 #[pyo3(signature = (out, first, action, scale, start, low, high, /))]
 #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only

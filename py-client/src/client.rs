@@ -286,7 +286,7 @@ impl Client {
             // two processes on one connection would take each other's frames
             let problem = format!(
                 "simulation `{name}` belongs to process {}, which this one was forked from; \
-                 attach to it by name to look on, or launch another",
+                 attach to it by name to observe, or launch another",
                 self.process
             );
             return Err(raise(py, "LeaseHeld", problem));

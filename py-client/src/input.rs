@@ -327,7 +327,7 @@ impl<'py> Mask<'py> {
     }
 }
 
-/// Seeds of a reset: one for all worlds, or one a world.
+/// Seeds of a reset: one for all worlds, or one per world.
 pub(crate) struct Seed<'py>(Option<PyReadonlyArrayDyn<'py, u64>>);
 
 impl<'py> Seed<'py> {

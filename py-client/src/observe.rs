@@ -85,7 +85,7 @@ impl Playback {
         })
     }
 
-    /// What the daemon told about itself, as JSON.
+    /// What the daemon announced about itself, as JSON.
     fn describe(&self, py: Python<'_>) -> String {
         serde_json::to_string(lock(py, &self.inner).description())
             .expect("a description is plain data")

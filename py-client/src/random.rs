@@ -22,7 +22,7 @@ const COLUMNS_MAX: usize = 1 << 24;
 ///     seeds: Seed of each row, uint64, shape ``(n,)``.
 ///     episodes: Episode of each row, uint32, shape ``(n,)``.
 ///     stream: What the numbers are for, 0 to 31; those of different streams have nothing to do with each other.
-///     columns: How many numbers a row gets, at most 2**24.
+///     columns: How many numbers each row gets, at most 2**24.
 ///     out: Where they go, float32 or float64, shape ``(n, columns)``, a part of another array if need be; a new
 ///         float64 array if left out.
 ///     firsts: Which number of the stream each row begins with, uint32, shape ``(n,)``; 0 if left out.

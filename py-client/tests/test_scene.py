@@ -46,7 +46,7 @@ def test_a_robot_starts_with_what_its_file_says(urdf):
     assert robot.joint_target_mode == ("position", "position")
 
 
-def test_one_value_is_for_every_dof_and_lists_are_one_a_dof(arm: tl.Robot):
+def test_one_value_is_for_every_dof_and_lists_are_one_per_dof(arm: tl.Robot):
     arm.joint_target_ke = 30
     arm.joint_armature = [0.1, 0.2]
     arm.joint_target_mode = "velocity"

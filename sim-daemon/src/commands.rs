@@ -35,7 +35,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     match result {
         Ok(()) => 0,
         Err(error) => {
-            // a daemon has said it, without waiting for whoever reads it
+            // a daemon has written it, without waiting for its reader
             if !matches!(&command, CliCommand::Serve(_)) {
                 let said = format!("tightloop: {error}");
                 let _ = writeln!(std::io::stderr(), "{}", printable(&said));

@@ -102,7 +102,7 @@ fn ask(name: &str) -> Result<Option<News>, ProtocolError> {
     for client in &clients {
         // the state at which it pauses, or the newest
         let first = match client.wait_newer(Some(COUNTED / 5), &mut hook) {
-            // where all seats are taken, no frame is counted
+            // where the daemon has no room for another observer, no frame is counted
             Err(ProtocolError::TooManyClients { .. }) => None,
             first => first?,
         };

@@ -131,7 +131,7 @@ pub(crate) fn beside(path: &Path) -> PathBuf {
 /// What `top` begins with to draw anew; no other code reaches a terminal.
 const CLEAR: &str = "\x1b[H\x1b[J";
 
-/// Prints a result, with codes for terminals as [`printable`] shows them. Whoever reads it may stop reading.
+/// Prints a result, with codes for terminals as [`printable`] shows them. Its reader may stop reading.
 ///
 /// # Errors
 /// What the system says, such as that the disk behind standard output is full.

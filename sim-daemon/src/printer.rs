@@ -1,4 +1,4 @@
-//! A thread that writes messages, so that whoever has one never waits for whoever reads it.
+//! A thread that writes messages, so that its sender never waits for its reader.
 //!
 //! A pipe that nobody reads and a stopped terminal block a write for as long as they like. The queue is bounded: when it is
 //! full, messages are dropped, and their number is written once somebody reads again.
@@ -132,7 +132,7 @@ fn print(mut target: impl Write, items: &Receiver<Item>, dropped: &AtomicU64) {
             Ok(Item::Flushed(done)) => {
                 report_dropped(&mut target, dropped);
                 let _ = target.flush();
-                // whoever waited may have given up
+                // the caller may have given up
                 let _ = done.send(());
             }
             Err(_) => return,

@@ -78,7 +78,7 @@ fn serve(
             Next::Late => {
                 host.give_up();
                 let started = Instant::now();
-                // a lost device has no worlds to advance; whoever commands them next is told
+                // a lost device has no worlds to advance; the next command gets the error
                 if lost(simulation).is_none() && apply(simulation, host, &mut mask, &mut ik).is_ok()
                 {
                     scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
@@ -112,7 +112,7 @@ fn serve(
             Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
         }
-        // whoever waited has a frame, and need not wait for this
+        // the client has its frame, and need not wait for this
         if !is_reported && let Some(lost) = simulation.lost() {
             log.write(&format!(
                 "all worlds are lost, and commands are refused from now on: {lost}"

@@ -34,7 +34,7 @@ const COUNT_MAX: u64 = u32::MAX as u64;
 const GROUPS_MAX: u64 = 64;
 
 /// Runs `tightloop serve`: from the arguments to the last cleaning. Prints one line to stdout when ready or failed, and
-/// errors to stderr, where whoever launched us does not get them from that line.
+/// errors to stderr, where our parent does not get them from that line.
 pub(crate) fn run(serve: &Serve) -> Result<(), DaemonError> {
     let streams = Streams::open().inspect_err(|error| {
         // nothing is served yet that could wait
@@ -490,7 +490,7 @@ fn announce_error(error: &DaemonError, streams: &Streams) {
     announce(&line, streams);
 }
 
-/// The one line on stdout. Whoever launched us may be gone already: the watchdog sees that.
+/// The one line on stdout. Our parent may be gone already: the watchdog sees that.
 fn announce(line: &serde_json::Value, streams: &Streams) {
     streams.stdout.print(format!("{line}\n"));
 }

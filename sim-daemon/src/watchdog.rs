@@ -69,7 +69,7 @@ impl Watchdog {
         let (end, ended) = channel();
         let priority = serve.priority;
         let work = move || {
-            // threads that step at that priority would leave it no core; who asks for one is told if it is not granted
+            // threads that step at that priority would leave it no core; a client that asks for one gets an error if it is not granted
             let _ = priority.map(signals::set_priority);
             watch.run(&ended);
         };
@@ -93,7 +93,7 @@ impl Watchdog {
         &self.stop
     }
 
-    /// From now on, this place is ours, and its files go with us. Whoever asks the first one to stop asks us.
+    /// From now on, this place is ours, and its files go with us. A request to stop the first one stops us.
     pub(crate) fn keep(&self, place: &DaemonLock) {
         let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
         places.push(place.remains());

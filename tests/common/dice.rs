@@ -45,7 +45,7 @@ impl Dice {
         of[self.below(of.len())].clone()
     }
 
-    /// A number a world or column.
+    /// A number per world or column.
     pub fn numbers(&mut self, n: usize, size: f64) -> Vec<f64> {
         (0..n).map(|_| size * self.number()).collect()
     }

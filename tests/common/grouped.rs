@@ -77,13 +77,13 @@ pub fn assert_groups_are_the_whole(options: Options, groups: usize) {
     assert_eq!(parts.len(), whole.len());
     for (world, (part, whole)) in parts.iter().zip(&whole).enumerate() {
         assert!(part == whole, "world {world} of {groups} groups");
-        // worlds that are alike would prove nothing
+        // identical worlds would prove nothing
         let next = &parts[(world + 1) % parts.len()];
         assert!(part != next, "world {world} is as the next one");
     }
 }
 
-/// Resets of all kinds and steps; the bits of each world in all frames. What it is told depends on the worlds' numbers, which
+/// Resets of all kinds and steps; the bits of each world in all frames. Its commands depend on the worlds' numbers, which
 /// begin with `first`.
 fn play(mut simulation: Simulation, first: usize) -> Vec<Vec<u8>> {
     let worlds = simulation.worlds();

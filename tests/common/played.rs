@@ -18,7 +18,7 @@ impl Played {
             let is_frozen =
                 |frame| self.counter(frame, world, Field::Status) as u32 & status::FROZEN != 0;
             let [last, step] = [before, frame].map(|frame| self.counter(frame, world, Field::Step));
-            // by itself, after a frame with trouble
+            // by itself, after a frame with a fault
             let was_reset = is_frozen(before) && step < 2;
             if !is_set && !was_reset {
                 if is_frozen(before) && !is_frozen(frame) {

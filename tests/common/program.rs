@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Numbers of a field or parameter in some of its columns, a row a world; none = the world is left alone.
+/// Numbers of a field or parameter in some of its columns, a row per world; none = the world is left alone.
 #[derive(Clone, Debug)]
 pub struct Rows {
     /// Columns that are set.
     pub columns: Range<usize>,
-    /// One a world.
+    /// One per world.
     pub rows: Vec<Option<Vec<f64>>>,
 }
 
@@ -32,7 +32,7 @@ pub enum Op {
     Write(Field, Rows),
     /// A parameter of some worlds.
     Param(Param, Rows),
-    /// Some worlds go back to the start; seeds are one, or one a world.
+    /// Some worlds go back to the start; seeds are one, or one per world.
     Reset(Vec<bool>, Option<Vec<u64>>),
     /// All worlds as bytes, kept under a number.
     Snapshot(usize),

@@ -9,7 +9,7 @@ use sim_physics::arrays::{Field, status};
 use std::time::Duration;
 
 #[test]
-fn after_a_device_is_lost_every_frame_says_so_and_nothing_panics() {
+fn after_a_device_is_lost_every_frame_reports_it_and_nothing_panics() {
     let model = lesson(Demo::Target).compile().unwrap();
     let mut run = run(&model, gpu(), 3, &[Field::JointQ]);
     run.step();

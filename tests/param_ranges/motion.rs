@@ -140,7 +140,7 @@ fn normal_draws_below_the_least_are_the_least() {
 }
 
 #[test]
-fn a_drive_that_follows_velocities_may_be_told_to_keep_its_gain_of_0() {
+fn a_drive_that_follows_velocities_may_keep_its_gain_of_0() {
     let mut scene = plain();
     let arm = &mut scene.robots[0];
     let joint = arm

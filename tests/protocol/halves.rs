@@ -81,7 +81,7 @@ fn an_interrupted_recv_may_be_taken_up_again() {
 }
 
 #[test]
-fn a_daemon_that_is_killed_in_between_is_told_by_every_call() {
+fn a_daemon_that_is_killed_in_between_is_reported_by_every_call() {
     let mut daemon = Daemon::start("killed-half", &[]);
     let client = daemon.attach();
     reset(&client);

@@ -127,7 +127,7 @@ fn a_client_that_attaches_knows_everything() {
 }
 
 #[test]
-fn frames_over_the_wire_equal_frames_in_process_bit_for_bit() {
+fn frames_over_the_protocol_equal_frames_in_process_bit_for_bit() {
     let daemon = Daemon::start("twin", &["--worlds", "5", "--threads", "1"]);
     let client = daemon.attach();
     let (mut simulation, mut arena) = twin(5);
@@ -284,7 +284,7 @@ fn a_frame_survives_its_client_and_its_daemon() {
 }
 
 #[test]
-fn a_second_controller_is_told_who_is_first_and_may_follow() {
+fn a_second_controller_learns_who_is_first_and_may_follow() {
     let daemon = Daemon::start("second", &[]);
     let (first, second) = (daemon.attach(), daemon.attach());
     assert_eq!(second.controller(&mut keep_waiting()).unwrap(), None);

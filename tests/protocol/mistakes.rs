@@ -216,7 +216,7 @@ fn another_protocol_version_is_refused_with_both_named() {
 }
 
 #[test]
-fn observers_keep_no_controller_out_and_one_too_many_is_told_the_limit() {
+fn observers_keep_no_controller_out_and_one_too_many_gets_the_limit() {
     let daemon = Daemon::start("many", &[]);
     let mut observers: Vec<_> = (0..32).map(|_| daemon.attach()).collect();
     for observer in &observers {
@@ -231,14 +231,14 @@ fn observers_keep_no_controller_out_and_one_too_many_is_told_the_limit() {
             daemon.name
         )
     );
-    // whoever may not observe may still command
+    // a client that may not observe may still command
     reset(&other);
     observers.truncate(31);
     daemon.attach().latest(&mut keep_waiting()).unwrap();
 }
 
 #[test]
-fn a_client_too_many_is_told_the_limit_and_may_come_when_another_goes() {
+fn a_client_too_many_gets_the_limit_and_may_come_when_another_goes() {
     let daemon = Daemon::start("more", &[]);
     let mut clients: Vec<_> = (0..64).map(|_| daemon.attach()).collect();
     let error = attach(&daemon.name).unwrap_err();

@@ -132,7 +132,7 @@ fn commands_that_are_left_on_the_card_move_the_robot_as_commands_from_here() {
         }
         card.holds(&frame);
     }
-    // a command holds; what lies in the memory is taken when a step says so
+    // a command holds; what lies in the memory is taken when a step asks for it
     card.leave("joint_target_q", &targets(500));
     let [frame, expected] = [step_on(&there, 0), step(&here, &[])].map(Result::unwrap);
     let q = |frame: &Frame| frame.field("joint_q").unwrap().as_bytes().to_vec();

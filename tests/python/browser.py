@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
-# Screenshots are kept: test output for whoever wants to see.
+# Screenshots are kept: test output for people.
 SHOTS = Path(__file__).parents[2] / "out" / "viewer"
 # Its software renderer needs seconds for a picture where other programs have the cores.
 PATIENCE_SECONDS = 120.0
@@ -51,7 +51,7 @@ class View:
         self.scene_width = width - PANEL_WIDTH
         self.page.set_default_timeout(PATIENCE_SECONDS * 1000)
         self.errors: list[str] = []
-        # everything that the console said, for whoever looks into an error
+        # everything that the console said, for the message of an error
         self.console: list[str] = []
         self.page.on("console", lambda said: self._hear(said.type, said.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -107,7 +107,7 @@ class View:
         return found
 
     def close_notices(self) -> None:
-        """Close what lies over the scene: Chromium renders in software, and viser says so."""
+        """Close what lies over the scene: Chromium renders in software, and viser warns of it."""
         for button in self.page.get_by_role("alert").get_by_role("button").all():
             button.click()
 

@@ -32,7 +32,7 @@ def check_stands(file: Path) -> None:
 
 
 def check_starts(file: Path) -> None:
-    """Check that a humanoid starts on its feet and is told in finite numbers until it falls."""
+    """Check that a humanoid starts on its feet and has finite observations until it falls."""
     env: Any = VectorEnv("HumanoidVelocityFlat", 4, model=file, pushes=0.0, threads=1)
     try:
         obs, _ = env.reset(seed=0)

@@ -93,7 +93,7 @@ def test_a_daemon_started_by_hand_ends_clean_on_a_signal(served, root, how):
     assert not any(name in path.name for path in root.iterdir())
 
 
-def test_a_daemon_that_was_restarted_is_told_from_the_one_known(pendulum, tmp_path, unique):
+def test_a_daemon_that_was_restarted_is_distinguished_from_the_one_known(pendulum, tmp_path, unique):
     name = unique()
     with tl.launch(pendulum, worlds=1, name=name) as first:
         known = tl.attach(name)
@@ -115,7 +115,7 @@ def test_another_protocol_version_is_refused_with_both_versions(root, unique):
     lock.unlink()
 
 
-def test_a_dead_daemon_is_told(served):
+def test_a_dead_daemon_is_reported(served):
     name, pid = served
     sim = tl.attach(name)
     sim.step()
@@ -149,7 +149,7 @@ def test_both_groups_of_a_daemon_that_is_still_starting_are_waited_for(pendulum,
     with started(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
             groups = tl.attach(name, timeout=60)
-            assert [sim.worlds for sim in groups] == [2, 2]
+            assert isinstance(groups, tl.Groups) and [sim.worlds for sim in groups] == [2, 2]
             groups.close()
         finally:
             process.send_signal(signal.SIGINT)

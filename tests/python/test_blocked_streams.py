@@ -1,4 +1,4 @@
-"""A daemon never waits for whoever should read its messages."""
+"""A daemon never waits for the reader of its messages."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_what_was_not_read_in_time_comes_once_somebody_reads(scene_file, unique,
     assert f"tightloop: {name}: 3 worlds on cpu" in said and "tightloop: ended\n" in said
 
 
-def test_an_error_at_the_start_is_told_to_whoever_reads_one_of_the_streams(scene_file, unique, full):
+def test_an_error_at_the_start_is_reported_to_the_reader_of_one_of_the_streams(scene_file, unique, full):
     process = serve(scene_file, unique(), full.writer, "--fields", "nonsense")
     assert process.stdout is not None
     assert line_of(process.stdout)["error"]["kind"] == "ArgumentError"

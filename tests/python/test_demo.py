@@ -67,7 +67,7 @@ def test_one_command_goes_through_the_stops_in_order(tmp_path):
 
 # As in test_reference.py: what two honest implementations differ by in single precision
 @pytest.mark.parametrize(("stop", "frames", "tolerance"), [(Torque, 60, 5e-5), (Target, 180, 2e-6), (Grasp, 90, 1e-5)])
-def test_world_0_is_as_far_from_mujoco_as_is_told(stop, frames, tolerance):
+def test_world_0_is_as_far_from_mujoco_as_is_reported(stop, frames, tolerance):
     told = ran(stop(2), frames)
     assert 0 < number(r"within (\S+) rad of MuJoCo C", told) <= tolerance
     assert f"over {frames / 60:.2g} s" in told
@@ -144,7 +144,7 @@ def test_wrong_arguments_are_refused(arguments, capsys):
     assert arguments[0] in capsys.readouterr().err
 
 
-def test_trouble_is_one_line(tmp_path, capsys):
+def test_an_error_is_one_line(tmp_path, capsys):
     assert main(["--stop", "torque", "--device", "gpu:no such adapter", "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.startswith("tightloop: ")
     (tmp_path / "file").write_text("")
@@ -235,7 +235,7 @@ def test_the_demo_of_a_robot_says_whether_its_joints_can_follow(tmp_path, effort
     assert re.search(said, FileScene(tmp_path / "robot.urdf", 4).title)
 
 
-def test_a_file_that_is_none_is_told(tmp_path):
+def test_a_file_that_is_none_is_reported(tmp_path):
     line = [sys.executable, "-m", "tightloop", "demo", str(tmp_path / "nowhere.urdf")]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert done.returncode == 1 and "nowhere.urdf" in done.stderr and "Traceback" not in done.stderr

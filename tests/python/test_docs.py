@@ -64,7 +64,7 @@ def test_blocks_that_do_not_run_say_why():
     for block in found:
         if block.needs:
             print(f"{block}: {block.needs}")
-    # whoever adds one says so here, too
+    # a new one is added here, too
     assert needs == {
         "needs a Ray cluster": 1,
         "needs a Ray cluster and stable-baselines3": 1,

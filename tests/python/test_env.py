@@ -103,7 +103,7 @@ def test_agrees_with_gymnasiums_vector_of_single_environments(mode: AutoresetMod
 
 
 def same_infos(mine: dict[str, Any], yours: dict[str, Any]) -> None:
-    """What is told of the same rows is the same; gymnasium leaves out what is told of none."""
+    """Infos of the same rows are the same; gymnasium leaves out infos of no row."""
     told = {name for name in mine if name[0] != "_" and mine[f"_{name}"].any()}
     assert told == {name for name in yours if name[0] != "_"}
     for name in told:

@@ -98,7 +98,7 @@ def test_a_daemon_of_something_else_is_refused_by_name(serve: Any) -> None:
     env.close()
 
 
-def test_misuse_of_serve_is_told(unique: Callable[[], str]) -> None:
+def test_misuse_of_serve_is_reported(unique: Callable[[], str]) -> None:
     for arguments, said in (
         (["serve", "FrankaDance", "--name", "a"], "FrankaReach"),
         (["serve", "FrankaReach"], "--name"),
@@ -144,7 +144,7 @@ def test_groups_that_are_not_even_are_refused() -> None:
         make_groups("FrankaReach", 10, first_env=5)
 
 
-def test_the_daemon_that_is_killed_is_told() -> None:
+def test_the_daemon_that_is_killed_is_reported() -> None:
     env = VectorEnv("FrankaReach", 2)
     env.reset(seed=0)
     os.kill(env.sim.pid, signal.SIGKILL)

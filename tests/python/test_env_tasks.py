@@ -1,4 +1,4 @@
-"""Tasks of one's own: what may be written in them, and what is told of what may not; the pool under them."""
+"""Tasks of one's own: what may be written in them, and the errors for what may not; the pool under them."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def broken(**functions: Any) -> type[CartPoleBalance]:
         ({"observed": lambda self: [Observed("x", 1, 0)]}, "low 1 must be below high 0"),
     ],
 )
-def test_what_is_wrong_with_a_task_is_told_by_name(functions: dict[str, Any], said: str, envs: Any) -> None:
+def test_what_is_wrong_with_a_task_is_reported_by_name(functions: dict[str, Any], said: str, envs: Any) -> None:
     with pytest.raises((tl.ArgumentError, AttributeError), match=said):
         env = envs(broken(**functions), 2)
         env.reset(seed=0)

@@ -93,7 +93,7 @@ def test_a_name_that_no_daemon_can_have_is_refused(name):
         tl.attach(name)
 
 
-def test_a_launch_that_fails_says_so_once(pendulum, capfd):
+def test_a_launch_that_fails_reports_it_once(pendulum, capfd):
     with pytest.raises(tl.ArgumentError):
         tl.launch(pendulum, worlds=1, device="tpu")
     assert capfd.readouterr() == ("", "")
@@ -201,7 +201,7 @@ def test_a_wrong_keyword_is_a_type_error(pendulum):
         sim.step(joint_g=[0, 0])  # pyright: ignore[reportCallIssue]
 
 
-def test_a_closed_sim_says_so(pendulum):
+def test_a_closed_sim_reports_it(pendulum):
     sim = tl.launch(pendulum, worlds=1)
     sim.close()
     sim.close()

@@ -90,7 +90,7 @@ def test_an_entry_of_a_leader_moves_its_followers_and_an_entry_of_theirs_counts(
     np.testing.assert_allclose(robot.joint_q, [row(0.8)[0], 0.8, 0.25, 0.5], atol=1e-15)
 
 
-def test_a_follower_that_is_given_otherwise_starts_there_and_is_told(scene):
+def test_a_follower_that_is_given_otherwise_starts_there_and_is_reported(scene):
     scene.robots["m"].joint_q = {"lead": 0.5, "last": 0.5}
     with (
         pytest.warns(tl.TightloopWarning, match=r"`m` starts with `last` at 0\.5000 rad.*`lead` puts it at -0\.1500"),
@@ -141,7 +141,7 @@ def test_states_by_name_move_followers_in_the_worlds_of_the_mask(scene, call):
         np.testing.assert_allclose(frame.joint_q, [row(0.7, 0.2)] * 3, atol=1e-15)
 
 
-def test_written_positions_that_contradict_are_told_once(scene):
+def test_written_positions_that_contradict_are_reported_once(scene):
     with tl.launch(scene, worlds=2) as sim:
         with pytest.warns(
             tl.TightloopWarning, match=r"joint_q of `m/next` is 0\.0000 in world 0, and its leader `m/lead`"
@@ -172,8 +172,9 @@ def test_a_gripper_that_is_commanded_by_its_leader_closes_as_one(lesson):
         tl.launch(scene, worlds=2, precision="f64", fields=fields) as alone,
         tl.launch(scene, worlds=2, precision="f64", fields=fields) as both,
     ):
+        goals = np.array([0.01, 0.03])
+        one = alone.forward()
         for _ in range(60):
-            goals = np.array([0.01, 0.03])
             one = alone.step(joint_target_q={FINGERS[0]: goals})
             two = both.step(joint_target_q={FINGERS[0]: goals, FINGERS[1]: goals})
             np.testing.assert_array_equal(one.joint_q, two.joint_q)
@@ -187,6 +188,7 @@ def test_a_gripper_that_is_commanded_by_its_leader_closes_as_one(lesson):
 
 def test_velocity_targets_of_followers_are_scaled_and_forces_are_left_alone(scene):
     robot = scene.robots["m"]
+    assert isinstance(robot, tl.Robot)
     robot.joint_target_mode, robot.joint_target_kd = "velocity", 1.0
     robot.joint_target_qd = {"lead": 0.5}
     assert robot.joint_target_qd.tolist() == [-0.05, 0.5, -0.25, 0.0]
@@ -197,7 +199,7 @@ def test_velocity_targets_of_followers_are_scaled_and_forces_are_left_alone(scen
         assert frame.joint_f[0].tolist() == [0.0, 2.0, 0.0, 0.0]
 
 
-def test_an_array_of_targets_that_contradict_is_told(lesson):
+def test_an_array_of_targets_that_contradict_is_reported(lesson):
     scene = lesson(driven=True)
     targets = np.array(scene.robots["arm"].joint_q)
     with tl.launch(scene, worlds=1) as sim:
@@ -211,14 +213,16 @@ def test_an_array_of_targets_that_contradict_is_told(lesson):
             sim.step(joint_target_q=targets)
 
 
-def test_targets_of_the_scene_that_contradict_are_told(lesson):
+def test_targets_of_the_scene_that_contradict_are_reported(lesson):
     scene = lesson(driven=True)
-    scene.robots["arm"].joint_target_q = {"fr3_finger_joint1": 0.01}
-    assert scene.robots["arm"].joint_target_q[8] == 0.01
+    arm = scene.robots["arm"]
+    assert isinstance(arm, tl.Robot)
+    arm.joint_target_q = {"fr3_finger_joint1": 0.01}
+    assert arm.joint_target_q[8] == 0.01
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         tl.launch(scene, worlds=1).close()
-    scene.robots["arm"].joint_target_q[8] = 0.03
+    arm.joint_target_q[8] = 0.03
     with pytest.warns(
         tl.TightloopWarning, match=r"`arm` has targets with `fr3_finger_joint2` at 0\.0300 m.*work against"
     ):

@@ -107,7 +107,7 @@ def test_without_a_driver_the_message_says_what_to_install(pendulum, serve):
 
 
 @pytest.mark.usefixtures("no_driver")
-def test_without_a_driver_devices_says_so_and_succeeds():
+def test_without_a_driver_devices_reports_it_and_succeeds():
     command = [sys.executable, "-m", "tightloop", "devices"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stdout.count("\n")) == (0, 1)

@@ -200,7 +200,7 @@ def test_a_daemon_with_groups_is_one_line_of_the_list_and_one_stop(drawn, tmp_pa
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
-def test_the_end_of_the_process_is_told_by_every_group_and_leaves_nothing(pendulum, root, how):
+def test_the_end_of_the_process_is_reported_by_every_group_and_leaves_nothing(pendulum, root, how):
     with tl.launch(pendulum, worlds=4, groups=2) as groups:
         stems = stems_of(groups.pid)
         for sim in groups:

@@ -153,7 +153,7 @@ def test_a_client_that_is_hit_hinders_nobody(pendulum, tmp_path, victim, how):
 
 
 @pytest.mark.parametrize("how", ["kill", "stop"])
-def test_a_daemon_that_is_hit_is_told_rightly(pendulum, root, how):
+def test_a_daemon_that_is_hit_is_reported_rightly(pendulum, root, how):
     draw, stems = random.Random(f"daemon {how}"), set[str]()
     for _ in range(ROUNDS):
         with tl.launch(pendulum, worlds=16, params=("gravity",)) as sim:

@@ -105,7 +105,7 @@ def test_knees_of_hind_legs_bend_ahead_where_that_is_easier(tmp_path: Path) -> N
     assert all(own[f"{leg}_thigh"] > 0.3 for leg in ("FL", "FR", "RL", "RR"))
 
 
-def test_standing_that_takes_half_of_an_effort_limit_is_told(tmp_path: Path) -> None:
+def test_standing_that_takes_half_of_an_effort_limit_is_reported(tmp_path: Path) -> None:
     text, file = QUADRUPED.read_text(), tmp_path / "weak.urdf"
     with warnings.catch_warnings():
         warnings.simplefilter("error", tl.TightloopWarning)
@@ -117,7 +117,7 @@ def test_standing_that_takes_half_of_an_effort_limit_is_told(tmp_path: Path) -> 
         QuadrupedVelocityFlat(model=file)
 
 
-def test_a_term_that_outweighs_all_others_for_a_minute_is_told_once() -> None:
+def test_a_term_that_outweighs_all_others_for_a_minute_is_reported_once() -> None:
     watch = TermWatch()
     heavy = {"train/return/torque": -61.0, "train/return/follow": 4.0, "train/return/gait": 2.0, "train/error": 900.0}
     even = heavy | {"train/return/torque": -59.0}
@@ -140,7 +140,7 @@ def test_a_term_that_outweighs_all_others_for_a_minute_is_told_once() -> None:
         ({"return": 5.0}, {"return": 4.9}, False),
     ],
 )
-def test_a_training_in_which_nothing_was_learnt_is_told(first, last, learnt) -> None:
+def test_a_training_in_which_nothing_was_learnt_is_reported(first, last, learnt) -> None:
     told = nothing_learnt([first, {"return": 1e9, "velocity_error": 0.0}, last])
     assert (told is None) == learnt
     assert nothing_learnt([first]) is None

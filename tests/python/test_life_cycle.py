@@ -97,7 +97,7 @@ def test_kill_9_of_the_caller_while_it_starts_a_daemon_leaves_nothing(pendulum_u
         assert wait_until(lambda: not list(root.iterdir()), 2.0), list(root.iterdir())
 
 
-def test_kill_9_of_the_daemon_at_any_moment_is_told_within_a_second(pendulum, root):
+def test_kill_9_of_the_daemon_at_any_moment_is_reported_within_a_second(pendulum, root):
     for kill in range(KILLS):
         with tl.launch(pendulum, worlds=64) as sim:
             stems = stems_of(sim.pid)

@@ -1,4 +1,4 @@
-"""A daemon at long work hears signals, ``tightloop stop`` and its owner's death; whoever attaches is answered."""
+"""A daemon at long work hears signals, ``tightloop stop`` and its owner's death; a new client gets an answer."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_a_daemon_that_waits_for_its_scene_hears_a_signal(root, unique):
         assert not list(root.iterdir()) and shared_folders(root) == []
 
 
-def test_whoever_attaches_while_a_daemon_steps_is_answered(unique):
+def test_a_client_that_attaches_while_a_daemon_steps_is_answered(unique):
     name = unique()
     with at_work("a step", name):
         began = time.monotonic()

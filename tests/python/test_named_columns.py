@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,7 +118,8 @@ def test_forces_by_body_robot_and_pattern_are_those_of_an_array(tmp_path):
         sim.send(body_f={"arm": np.zeros((sim.bodies["arm"].stop, 6)), "arm/fr3_hand": (0, 0, 7, 0, 0, 0)})
         sim.recv()
         np.testing.assert_array_equal(sim.params.body_f, array)
-        sim.params.body_f = {"cube": [1, 2, 3, 4, 5, 6], "arm": {"fr3_link1": np.ones((3, 6))}}
+        named: Any = {"cube": [1, 2, 3, 4, 5, 6], "arm": {"fr3_link1": np.ones((3, 6))}}
+        sim.params.body_f = named
         array[:, sim.bodies["cube"]] = [1, 2, 3, 4, 5, 6]
         array[:, sim.body_names.index("arm/fr3_link1")] = 1.0
         np.testing.assert_array_equal(sim.params.body_f, array)
@@ -130,7 +132,7 @@ def test_forces_by_body_robot_and_pattern_are_those_of_an_array(tmp_path):
         ({"hand": [0.0] * 6}, r"no robot `hand`; .*Bodies are named with it, such as 'cube/body'"),
         (
             {"arm/fr3_hand": [0.0] * 3},
-            r"`arm/fr3_hand`: expected shape \(6,\) for every world alike, or \(3, 6\).*\(3,\)",
+            r"`arm/fr3_hand`: expected shape \(6,\) for all worlds, or \(3, 6\).*\(3,\)",
         ),
         ({"arm": [0.0] * 6}, r"body_f of `arm`: expected shape \(\d+, 6\)"),
         ({3: [0.0] * 6}, r"key 3; give names of robots or of bodies"),

@@ -51,7 +51,7 @@ def test_each_is_read_as_it_was_written(sim):
     } | {name: (2,) for name in ALL if name.startswith("joint_")}
 
 
-def test_a_row_or_a_number_is_for_every_world_alike(sim):
+def test_a_row_or_a_number_is_for_all_worlds(sim):
     sim.params.gravity = (0.0, 0.0, -1.62)
     np.testing.assert_allclose(sim.params.gravity, np.tile([0, 0, -1.62], (WORLDS, 1)), rtol=1e-6)
     sim.params.joint_damping = 0.25

@@ -1,4 +1,4 @@
-"""Whether a daemon is there: told rightly when its folder is gone, descriptors run out, or its name is taken."""
+"""Whether a daemon is there: reported rightly when its folder is gone, descriptors run out, or its name is taken."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -82,7 +83,7 @@ sim.step()
 """
 
 
-def test_a_client_without_descriptors_steps_on_and_is_told_what_it_lacks(pendulum_urdf):
+def test_a_client_without_descriptors_steps_on_and_reports_what_it_lacks(pendulum_urdf):
     code = NO_DESCRIPTORS.format(urdf=str(pendulum_urdf))
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False)
     assert process.returncode == 0, process.stderr
@@ -97,7 +98,7 @@ def lock_file(root, unique) -> Iterator[Path]:
     path.unlink()
 
 
-def test_a_name_that_something_holds_in_silence_is_told_so(lock_file):
+def test_a_name_that_something_holds_in_silence_gets_an_error(lock_file):
     with lock_file.open("w") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         began = time.monotonic()
@@ -118,7 +119,8 @@ def test_a_stopped_daemon_is_closed_as_any_other(pendulum):
     sim = tl.launch(pendulum, worlds=4)
     os.kill(sim.pid, signal.SIGSTOP)
     assert wait_until(lambda: stopped(sim.pid), 5.0)
-    process = sim._end.peek()[2][1].process
+    end: Any = sim._end.peek()
+    process = end[2][1].process
     sim.close()
     assert process.returncode == 0, "it ended by itself; a killed one has -9"
     assert not alive(sim.pid)

@@ -1,4 +1,4 @@
-"""The words of the documents: links lead somewhere, sentences are short, nobody is told to install another project."""
+"""The words of the documents: links lead somewhere, sentences are short, no document installs another project."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pytest
 from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "docs"))
+from prose_of_code import files, written
 from sentence_length import LONG, markdown_files, sentences, summary
 
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "docs/pages"]
@@ -20,6 +21,29 @@ DOCUMENTS = sorted({*markdown_files([REPOSITORY / "docs/pages"]), *REPOSITORY.gl
 MEAN, LONGEST = 16, 30  # words; docs/sentence_length.py lists the sentences
 # What shells and people would install: the project of somebody else under our import's name.
 FOREIGN = re.compile(r"pip3? install (?:-\S+ )*[\"'`]?tightloop(?![\w-])")
+
+# Words that only this project's authors understand, and the field's words for them.
+DIALECT = {
+    r"\b(?:physics|kernel|solver|step)(?:'s)? text\b"
+    r"|\btexts? of (?:the )?(?:physics|kernels?|steps?|stages?)\b": "kernel source",
+    r"\bmachines? that (?:runs?|writes?) (?:the|it)\b": "backend",
+    r"\btold\b|\bsays? so\b|\bsaid so\b": "reported, logged",
+    r"\b(?:turns?|rounds?) of (?:the )?(?:solver|newton)\b"
+    r"|\b(?:solver|newton)(?:'s)? (?:turns?|rounds?)\b": "iteration",
+    r"\bwhat is shown of\b|\bexports? of fields\b": "outputs",
+    r"\b(?:is|are) no software\b(?! driver)": "a hardware GPU",
+    r"\b(?:one|two|three|four|six|eight|values?|numbers?|rows?|bytes?|bits?|scalars?|entry|entries|lines?|words|columns"
+    r"|seeds?|threads?|kernels?|digests?|evaluations?)(?: number| value)? an? (?:world|coordinate|dof|joint|body"
+    r"|contact|frame|lane|line|row|column|commit|field|robot|iteration|step|substep|command|pair|hull|model|sensor|link|second"
+    r"|shape|slot|element|side)\b(?! may)": "per",
+    r"\bworlds? (?:are |that are )?alike\b|\bworlds (?:have|of|with) [a-z]+ of their own\b": "identical, independent",
+    r"\blook(?:s|ed|ing)? on\b|\bonlookers?\b": "observe, observer",
+    r"\btroubles?\b|\btroubled\b": "fault",
+    r"\bseats?\b": "lane",
+    r"\bthe wire\b": "protocol",
+    r"\bbones?\b": "skeleton",
+    r"\bwhoever\b|\bnext to nothing\b": "a process that, a user who; little",
+}
 
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"(`+)(?!`).+?\1")
@@ -105,7 +129,7 @@ code()  # This too. And this.
     assert (made.count, made.percentile_95, made.longest) == (20, 1, LONG + 2)
 
 
-def test_nobody_is_told_to_install_the_project_of_another_name():
+def test_nobody_is_reported_to_install_the_project_of_another_name():
     trees = ["docs", "examples", "py-client", "sim-core", "sim-daemon", "tests", "benches"]
     suffixes = {".md", ".py", ".pyi", ".rs", ".txt", ".toml", ".yml"}
     files = [file for tree in trees for file in (REPOSITORY / tree).rglob("*") if file.suffix in suffixes]
@@ -117,6 +141,46 @@ def test_nobody_is_told_to_install_the_project_of_another_name():
     assert not FOREIGN.search("pip install dist/tightloop_sim-*.whl") and not FOREIGN.search(
         "pip install tightloop-sim"
     )
+
+
+def dialect(sentence: str) -> str | None:
+    """Return the words for what a sentence says in dialect; none where it says nothing so."""
+    found = (words for pattern, words in DIALECT.items() if re.search(pattern, sentence, re.IGNORECASE))
+    return next(found, None)
+
+
+def test_comments_names_of_tests_and_messages_use_the_words_of_the_field():
+    read = [file for file in files(REPOSITORY) if file.name not in ("prose_of_code.py", "test_prose.py")]
+    wrong = [
+        f"{file.relative_to(REPOSITORY)}:{line}: write `{words}`: {sentence.strip()[:100]}"
+        for file in read
+        for line, sentence in written(file, file.read_text(errors="replace"))
+        if (words := dialect(sentence))
+    ]
+    assert len(read) > 1000
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "lines"),
+    [
+        ("a.rs", '/// Nobody is told.\nlet told = "told";\n', [1]),
+        ("a.rs", 'let x = 1; // a row a world\nfail!("the user is \\\n told of it here");\n', [1, 2]),
+        ("a.rs", "#[test]\nfn a_lost_device_says_so() {\n    let seat = '\"'; // `seat`\n}\n", [1]),
+        ("a.rs", 'r#"<skin a="whoever sits on it">"#; "whoever"', [1]),
+        (
+            "a.py",
+            '"""Whoever\n\nreads it on the wire.\n"""\nseat = 1  # a seat\n\ndef test_it_is_told(): ...\n',
+            [1, 3, 5, 7],
+        ),
+        ("a.py", 'raise ValueError(f"{x} is told what to do")\ntold["told"]\n', [1]),
+        ("a.toml", 'seat = "the seat"  # the seat\n', [1]),
+        ("a.md", "The wire.\n\n```sh\nthe wire\n```\n\n`the wire`, and the wire\n", [1, 7]),
+    ],
+)
+def test_dialect_is_found_where_readers_meet_it(name, text, lines):
+    found = {line for line, sentence in written(Path(name), text) if dialect(sentence)}
+    assert sorted(found) == lines
 
 
 def test_the_readme_is_short():

@@ -113,7 +113,7 @@ def test_the_log_counts_frozen_worlds_and_does_not_list_them(pendulum, tmp_path)
             torque[world] = 1e4
             sim.step(joint_f=torque)
         lines, passed = frozen_lines(log), time.monotonic() - begun
-    # a line may come late, and be told by the next command or at the end
+    # a line may come late, and be reported by the next command or at the end
     assert lines[0] == (
         "frozen: 100 worlds (100 no longer finite), the first of them world 7, no longer finite after its step 3; "
         "frozen now: 100 of 4096"

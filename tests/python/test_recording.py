@@ -53,7 +53,7 @@ def replay(out: Path, *flags: str) -> tuple[int, str]:
 
 
 def act(sim: tl.Sim, snapshots: list[tl.Snapshot], count: int, seed: int) -> bool:
-    """Commands of every kind; whether a world got into trouble."""
+    """Commands of every kind; whether a world faulted."""
     rng = np.random.default_rng(seed)
     kinds: list[Callable[[], object]] = [
         lambda: sim.reset(mask=rng.random(WORLDS) > 0.5),
@@ -66,7 +66,7 @@ def act(sim: tl.Sim, snapshots: list[tl.Snapshot], count: int, seed: int) -> boo
         lambda: sim.restore(snapshots[-1], worlds=rng.random(WORLDS) > 0.5),
         lambda: sim.restore(snapshots[0], from_world=int(rng.integers(WORLDS))),
         sim.forward,
-        # far beyond the bounds, in which a world is frozen and, where the run says so, reset
+        # far beyond the bounds, in which a world is frozen and, where the run resets, reset
         lambda: sim.step(joint_f=rng.normal(size=(WORLDS, 2)) * 1e5 * (rng.random((WORLDS, 1)) > 0.9)),
     ]
     trouble = False
@@ -188,7 +188,7 @@ def test_a_forced_recording_that_is_not_whole_leaves_the_old_one(pendulum, tmp_p
     assert link.is_symlink() and "7 frames" in replay(out)[1]
 
 
-def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_told(pendulum, tmp_path):
+def test_a_recording_under_a_loop_that_goes_on_ends_when_it_is_closed(pendulum, tmp_path):
     with tl.launch(pendulum, worlds=WORLDS) as sim:
         for flags, ending in (((), signal.SIGINT), (("--seconds", "0.3"), None)):
             recorder = Recorder(sim, tmp_path / f"{ending}.tlrec", *flags)
@@ -223,7 +223,7 @@ def test_a_recorder_that_stands_now_and_then_goes_on_and_the_steps_that_are_miss
             for _ in range(12_000):
                 sim.step(joint_f=np.ones(2))
             recorder.process.send_signal(signal.SIGCONT)
-            # it has the state behind the gap once it says so, under a loop that goes on
+            # it has the state behind the gap once it reports it, under a loop that goes on
             limit = time.monotonic() + 60
             while news.empty() and time.monotonic() < limit:
                 sim.step(joint_f=-np.ones(2))

@@ -177,7 +177,7 @@ def test_a_floating_robot_is_moved_by_body_q(pendulum_urdf):
         (True, r"seed is True; give"),
         (np.True_, r"seed is .*True.*; give"),
         ("7", r"seed is '7'; give"),
-        ([1, 2], r"seed: 2 seeds for 3 worlds; give one, or one a world"),
+        ([1, 2], r"seed: 2 seeds for 3 worlds; give one, or one per world"),
         ([], r"seed: 0 seeds for 3 worlds"),
         ([1, -2, 3], r"seed of world 1 is -2; give"),
         ([1, 2, 3.0], r"seed of world 2 is 3\.0"),

@@ -151,7 +151,7 @@ def test_other_python_threads_run_while_recv_waits(pendulum):
         assert counted > 1000
 
 
-def test_a_daemon_that_is_killed_in_between_is_told_within_a_second(pendulum):
+def test_a_daemon_that_is_killed_in_between_is_reported_within_a_second(pendulum):
     with tl.launch(pendulum, worlds=2) as sim:
         os.kill(sim.pid, signal.SIGSTOP)
         sim.send()

@@ -15,12 +15,12 @@ scene = tl.Scene(dt=1 / 480, substeps=4)
 scene.add_urdf({urdf!r}, name="arm")
 sim = tl.launch(scene, worlds=4, params=("gravity",))
 kept = sim.snapshot()
-told = []
+raised = []
 def handler(*_):
     try:
-        told.append(type({inner}).__name__)
+        raised.append(type({inner}).__name__)
     except tl.TightloopError as error:
-        told.append(type(error).__name__)
+        raised.append(type(error).__name__)
     finally:
         proceed()
 def proceed():
@@ -29,11 +29,11 @@ signal.signal(signal.SIGALRM, handler)
 os.kill(sim.pid, signal.SIGSTOP)
 signal.setitimer(signal.ITIMER_REAL, 0.3)
 try:
-    told.append(type({outer}).__name__)
+    raised.append(type({outer}).__name__)
 except tl.TightloopError as error:
-    told.append(type(error).__name__)
+    raised.append(type(error).__name__)
 {after}
-print(*told, flush=True)
+print(*raised, flush=True)
 """
 REFUSED = "CallInProgress"
 
@@ -51,13 +51,13 @@ def said(code: str, seconds: float = 30.0) -> str:
 @pytest.mark.parametrize("inner", ["sim.step()", "sim.snapshot()", "sim.params.gravity", "sim.send()"])
 def test_a_call_from_a_handler_inside_a_call_is_refused_and_both_go_on(pendulum_urdf, outer, inner):
     code = SCRIPT.format(
-        urdf=str(pendulum_urdf), inner=inner, outer=outer, after="told.append(type(sim.step()).__name__)"
+        urdf=str(pendulum_urdf), inner=inner, outer=outer, after="raised.append(type(sim.step()).__name__)"
     )
     words = {"sim.step()": "Frame", "sim.snapshot()": "Snapshot", "sim.restore(kept)": "Frame", "sim.reset()": "Frame"}
     assert said(code) == f"{REFUSED} {words.get(outer, 'PropertyArray')} Frame"
 
 
-def test_a_handler_may_ask_who_is_in_control_and_look_on(pendulum_urdf):
+def test_a_handler_may_ask_who_is_in_control_and_observe(pendulum_urdf):
     inner = "(sim.latest(), threading.Timer(0.2, os.kill, (sim.pid, signal.SIGCONT)).start(), sim.controller())"
     code = SCRIPT.format(urdf=str(pendulum_urdf), inner=inner, outer="sim.step()", after="")
     assert said(code) == "tuple Frame"
@@ -69,7 +69,7 @@ def test_a_handler_inside_a_question_to_the_daemon_may_not_ask_another(pendulum_
 
 
 def test_control_that_a_handler_releases_goes_when_the_call_returns(pendulum_urdf):
-    after = "told.append(str(sim.controller())); sim.step(); told.append(str(sim.controller() == os.getpid()))"
+    after = "raised.append(str(sim.controller())); sim.step(); raised.append(str(sim.controller() == os.getpid()))"
     code = SCRIPT.format(urdf=str(pendulum_urdf), inner="sim.release()", outer="sim.step()", after=after)
     assert said(code) == "NoneType Frame None True"
 
@@ -83,13 +83,13 @@ def test_a_handler_may_close_the_simulation_that_it_interrupts(pendulum_urdf):
 def test_a_handler_that_raises_ends_the_call(pendulum_urdf):
     # as a handler of SIGTERM does that cleans up and exits
     inner = "(sim.close(), exit(0))"
-    code = SCRIPT.format(urdf=str(pendulum_urdf), inner=inner, outer="sim.step()", after="told.append('went on')")
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner=inner, outer="sim.step()", after="raised.append('went on')")
     assert said(code.replace("        proceed()", "        pass")) == ""
 
 
 def test_ctrl_c_reaches_a_thread_that_waits_behind_another(pendulum_urdf):
     outer = """wait(threading.Thread(target=sim.step))"""
-    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="interrupt()", outer=outer, after="told.append(str(in_time))")
+    code = SCRIPT.format(urdf=str(pendulum_urdf), inner="interrupt()", outer=outer, after="raised.append(str(in_time))")
     helpers = """
 def interrupt():
     raise KeyboardInterrupt
@@ -104,12 +104,12 @@ def wait(first):
     proceed()
     first.join()
 """
-    code = code.replace("told = []", "told = []" + helpers).replace("        proceed()", "        pass")
+    code = code.replace("raised = []", "raised = []" + helpers).replace("        proceed()", "        pass")
     assert said(code) == "NoneType True"
 
 
 def test_a_release_inside_a_call_that_is_interrupted_is_no_release_of_a_later_one(pendulum_urdf):
-    after = "sim.step(); told.append(str(sim.controller() == os.getpid()))"
+    after = "sim.step(); raised.append(str(sim.controller() == os.getpid()))"
     code = SCRIPT.format(urdf=str(pendulum_urdf), inner="(sim.release(), interrupt())", outer="wait()", after=after)
     helpers = """
 def interrupt():
@@ -121,4 +121,4 @@ def wait():
         return None
 sim.release()
 """
-    assert said(code.replace("told = []", "told = []" + helpers)) == "NoneType True"
+    assert said(code.replace("raised = []", "raised = []" + helpers)) == "NoneType True"

@@ -266,7 +266,7 @@ def test_a_lack_of_address_space_is_named_with_the_cure(pendulum, tmp_path):
     assert re.search(r"no more memory.*ulimit -v unlimited.*fewer worlds", process.stderr), process.stderr
 
 
-def test_a_snapshot_for_which_no_file_can_be_opened_says_so(pendulum):
+def test_a_snapshot_for_which_no_file_can_be_opened_reports_it(pendulum):
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with tl.launch(pendulum, worlds=1) as sim:
         sim.step()
@@ -282,7 +282,7 @@ def test_a_snapshot_for_which_no_file_can_be_opened_says_so(pendulum):
         assert sim.snapshot().worlds == 1
 
 
-def test_a_snapshot_for_which_the_daemon_can_open_no_file_says_so(pendulum):
+def test_a_snapshot_for_which_the_daemon_can_open_no_file_reports_it(pendulum):
     with tl.launch(pendulum, worlds=1) as sim:
         sim.step()
         used = {int(file.name) for file in Path(f"/proc/{sim.pid}/fd").iterdir()}

@@ -191,7 +191,7 @@ def test_without_room_the_error_names_the_folder_of_the_system(
         assert "/dev/shm" not in str(problem.value)
 
 
-#: ``python -m tightloop.env serve`` on a system that it is told.
+#: ``python -m tightloop.env serve`` on a system that a variable names.
 SERVE = """
 import sys, types
 from tightloop import system
@@ -229,7 +229,7 @@ def test_a_process_apart_is_a_session_or_a_group_of_its_own(monkeypatch: pytest.
 
 
 class Process:
-    """A process that notes what it is told."""
+    """A process that notes what it receives."""
 
     def __init__(self, problem: Exception | None = None) -> None:
         self.told: list[Any] = []
@@ -274,7 +274,7 @@ def test_what_asks_a_process_to_end_is_a_stop_signal_there(monkeypatch: pytest.M
         assert system.stop_signals() == (signal.SIGINT, signal.SIGTERM, 21)
 
 
-def test_an_orphan_on_windows_is_one_whose_parents_handle_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_orphan_on_windows_is_one_whose_parents_handle_reports_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """``python.exe`` of a virtual environment starts another process, so that the parent's id tells nothing."""
     ended = set[int]()
     kernel = SimpleNamespace(

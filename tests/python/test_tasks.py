@@ -98,8 +98,8 @@ def test_functions_on_an_arena_take_no_memory_of_the_size_of_the_worlds(envs: An
     many, pool = 65536, ArrayPool()
     first, second = any_worlds(envs, many, seed=5), any_worlds(envs, many, seed=6)
     pooled = Worlds(**{field: wrapped(pool, array) for field, array in vars(first).items()})
-    # an array of one number a world is 256 kB. NumPy's own buffers, for what has another type or no even stride, are of
-    # 8192 numbers for each of up to three operands, and go when the operation ends
+    # an array of one number per world is 256 kB. NumPy's own buffers, for what has another type or no even stride, are
+    # of 8192 numbers for each of up to three operands, and go when the operation ends
     least, buffers = 4 * many, 3 * 4 * 8192
     for function in ("observe", "reward", "success", "terminated"):
         call, tape = getattr(envs.task, function), []

@@ -200,7 +200,7 @@ def test_a_host_that_is_not_this_machine_gets_no_answer(sim: tl.Sim, host: str) 
             assert status(port, "GET /metrics HTTP/1.1", f"Host: {ours}") == 200
 
 
-def test_a_scrape_while_a_daemon_steps_is_told_so(unique: Callable[[], str]) -> None:
+def test_a_scrape_while_a_daemon_steps_gets_an_error(unique: Callable[[], str]) -> None:
     name = unique()
     scene = tl.Scene(dt=1e-4, substeps=10_000)
     scene.add_urdf(URDF, name="arm")

@@ -159,7 +159,7 @@ def test_textures_of_the_robot_file_are_their_mean(tmp_path):
     assert len(found.notes) == 1 and "broken.png" in found.notes[0]
 
 
-def test_a_link_of_which_nothing_can_be_shown_is_told_and_a_robot_is_then_seen_as_its_bones(tmp_path):
+def test_a_link_of_which_nothing_can_be_shown_is_reported_and_a_robot_is_then_seen_as_its_skeleton(tmp_path):
     mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     lost = visual('<mesh filename="missing.stl"/>') + mass
     joint = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/></joint>'
@@ -220,7 +220,7 @@ def test_robots_without_visuals_and_scenes_are_seen_as_they_touch(tmp_path):
     assert shelf[0] is shelf[1]
 
 
-def test_a_robot_without_visuals_and_collisions_is_seen_as_its_bones(tmp_path):
+def test_a_robot_without_visuals_and_collisions_is_seen_as_its_skeleton(tmp_path):
     inertia = '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     mass = f'<inertial><origin xyz="0 0 {{}}"/>{inertia}</inertial>'
     links = link("a", mass.format(0)) + link("b", mass.format(-0.5)) + link("c", mass.format(0.001))

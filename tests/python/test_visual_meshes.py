@@ -200,7 +200,7 @@ def test_a_mirror_keeps_the_outside_outside(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["dae", "obj", "stl", "glb", "gltf"])
-def test_broken_files_say_so(tmp_path, ending):
+def test_broken_files_report_it(tmp_path, ending):
     path = tmp_path / f"broken.{ending}"
     for content in (b"", b"\0" * 200, b"{", b"<COLLADA/>", b"solid x\nendsolid x\n", b"v 0 0 0\nf 1 2 3\n"):
         path.write_bytes(content)
@@ -211,7 +211,7 @@ def test_broken_files_say_so(tmp_path, ending):
         visual_mesh.read(path)
 
 
-def test_cut_files_say_so_or_are_read(tmp_path):
+def test_cut_files_report_it_or_are_read(tmp_path):
     for path in (
         looks.stl(tmp_path / "box.stl"),
         looks.obj(tmp_path / "box.obj", mtl=MTL),

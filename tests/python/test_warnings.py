@@ -1,10 +1,11 @@
-"""What is valid in a scene and most likely a mistake: told at launch, once, with the cure."""
+"""What is valid in a scene and most likely a mistake: reported at launch, once, with the cure."""
 
 from __future__ import annotations
 
 import re
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,13 +29,13 @@ def hinge(tmp_path: Path) -> tl.Robot:
     return robot(tl.Scene(), tmp_path)
 
 
-def robot(scene: tl.Scene, folder: Path, effort: str = "10", **options: bool) -> tl.Robot:
+def robot(scene: tl.Scene, folder: Path, effort: str = "10", **options: Any) -> tl.Robot:
     path = folder / "hinge.urdf"
     path.write_text(HINGE.format(effort=effort))
     return scene.add_urdf(path, **options)
 
 
-def told(scene: tl.Scene, **options: object) -> list[str]:
+def told(scene: tl.Scene, **options: Any) -> list[str]:
     """Launch a scene, and return what it warns of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -117,7 +118,7 @@ def test_targets_without_gains(tmp_path):
     assert told(scene, params=("joint_target_ke",)) == []
 
 
-def test_targets_of_a_step_that_nothing_follows_are_told_once(tmp_path):
+def test_targets_of_a_step_that_nothing_follows_are_reported_once(tmp_path):
     scene = tl.Scene()
     robot(scene, tmp_path)
     with tl.launch(scene, worlds=2) as sim:

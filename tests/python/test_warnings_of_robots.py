@@ -1,10 +1,11 @@
-"""Robots that fall for ever, hang in the air or touch nothing, and units of files: told at launch, with the cure."""
+"""Robots that fall for ever, hang in the air or touch nothing, and units of files: reported with their cure."""
 
 from __future__ import annotations
 
 import re
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,7 +30,7 @@ def robot(folder: Path, parts: list[str], collision: str = BALL, limits: tuple[f
     return path
 
 
-def told(scene: tl.Scene, **options: object) -> list[str]:
+def told(scene: tl.Scene, **options: Any) -> list[str]:
     """Launch a scene, and return what it warns of."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -93,7 +94,7 @@ def test_fingers_are_no_legs(tmp_path):
 
 def test_gravity_as_one_number():
     with pytest.raises(tl.SceneError, match=r"gravity is -9\.81; give 3 numbers, with z up, such as \(0, 0, -9\.81\)"):
-        tl.Scene(gravity=-9.81)
+        tl.Scene(gravity=-9.81)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

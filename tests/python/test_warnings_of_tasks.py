@@ -49,7 +49,7 @@ def test_an_action_that_is_nan_is_named_with_its_world_and_the_cure():
         envs.close()
 
 
-def test_observations_beyond_their_bounds_are_told_with_the_share_and_the_cure():
+def test_observations_beyond_their_bounds_are_reported_with_the_share_and_the_cure():
     class Narrow(CartPoleBalance):
         def observed(self) -> list[Observed]:
             *others, last = super().observed()
@@ -174,12 +174,12 @@ def told_of(define) -> list[str]:
         ("num_envs", 4, "give it to VectorEnv"),
     ],
 )
-def test_a_misspelt_member_is_told_with_the_right_name(member, value, cure):
+def test_a_misspelt_member_is_reported_with_the_right_name(member, value, cure):
     [warning] = told_of(lambda: type("Own", (CartPoleBalance,), {member: value}))
     assert warning == f"task Own: nothing uses its `{member}`; {cure}"
 
 
-def test_a_misspelt_attribute_of_a_task_itself_is_told():
+def test_a_misspelt_attribute_of_a_task_itself_is_reported():
     class Own(CartPoleBalance):
         def __init__(self) -> None:
             super().__init__()

@@ -1,10 +1,11 @@
-"""Draws and writes that look like factors, two grounds, and drives that swing or shake: told with the cure."""
+"""Draws and writes that look like factors, two grounds, and drives that swing or shake: reported with the cure."""
 
 from __future__ import annotations
 
 import re
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ from tightloop.tasks.reach import FrankaReach
 AROUND_1 = tl.Uniform(0.8, 1.2)
 
 
-def told(scene: tl.Scene, **options: object) -> list[str]:
-    """Launch a scene, and return what it warns of, also if it was told before."""
+def told(scene: tl.Scene, **options: Any) -> list[str]:
+    """Launch a scene, and return what it warns of, also if it was reported before."""
     advice.forget()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -73,7 +74,7 @@ def arm(scene: tl.Scene, folder: Path, damping: float = 7.0, friction: float = 5
         ({"shape_mu": {"table": AROUND_1}}, r"shape_mu of `table`.*0\.3 in the model"),
     ],
 )
-def test_a_draw_around_1_of_what_it_replaces_is_told_as_a_factor(params, said, tmp_path):
+def test_a_draw_around_1_of_what_it_replaces_is_reported_as_a_factor(params, said, tmp_path):
     scene = tl.Scene()
     arm(scene, tmp_path)
     scene.add_box(half_extents=(0.1, 0.1, 0.1), pos=(2, 0, 0), mu=0.3, name="table")
@@ -118,7 +119,7 @@ def test_the_randomization_of_an_environment_is_looked_at():
 
 
 @pytest.mark.parametrize("name", ["body_mass", "joint_target_ke", "joint_target_kd", "joint_damping"])
-def test_a_write_of_factors_is_told_and_one_of_values_is_not(name, tmp_path):
+def test_a_write_of_factors_is_reported_and_one_of_values_is_not(name, tmp_path):
     scene = tl.Scene()
     arm(scene, tmp_path)
     factors = np.random.default_rng(0)
@@ -133,7 +134,7 @@ def test_a_write_of_factors_is_told_and_one_of_values_is_not(name, tmp_path):
             setattr(sim.params, name, np.where(own == 0.0, 0.0, factors.uniform(0.8, 1.2, own.shape)))
 
 
-def test_two_grounds_are_told():
+def test_two_grounds_are_reported():
     scene = tl.Scene()
     scene.add_cube(pos=(0, 0, 1))
     scene.add_ground()
@@ -150,7 +151,7 @@ def test_two_grounds_are_told():
     assert "`floor` is 0.2000 m above `ground`" in warning and "Leave one of them out" in warning
 
 
-def test_a_ground_beside_that_of_a_mujoco_model_is_told(tmp_path):
+def test_a_ground_beside_that_of_a_mujoco_model_is_reported(tmp_path):
     pytest.importorskip("mujoco")
     model = tmp_path / "floor.xml"
     model.write_text(
@@ -164,7 +165,7 @@ def test_a_ground_beside_that_of_a_mujoco_model_is_told(tmp_path):
     assert "are the same plane" in warning and "`ground`" in warning and "floor" in warning
 
 
-def test_a_body_that_starts_below_the_ground_is_told():
+def test_a_body_that_starts_below_the_ground_is_reported():
     scene = tl.Scene()
     scene.add_ground()
     scene.add_cube(pos=(0, 0, -3))
@@ -172,7 +173,7 @@ def test_a_body_that_starts_below_the_ground_is_told():
     assert "`cube/box` is 3.02 m deep in `ground`" in warning
 
 
-def test_stiffness_without_damping_is_told(tmp_path):
+def test_stiffness_without_damping_is_reported(tmp_path):
     scene = tl.Scene()
     robot = arm(scene, tmp_path, damping=0.0, friction=0.0)
     robot.joint_target_kd = 0.0
@@ -194,7 +195,7 @@ def test_stiffness_without_damping_is_told(tmp_path):
     assert told(held) == []
 
 
-def test_gains_that_a_time_step_cannot_hold_shake_and_are_told(tmp_path):
+def test_gains_that_a_time_step_cannot_hold_shake_and_are_reported(tmp_path):
     urdf = Path(tmp_path / "light.urdf")
     urdf.write_text(
         """<robot name="light"><link name="base"/><link name="tip"><inertial><mass value="1"/>
@@ -220,6 +221,7 @@ def test_gains_that_a_time_step_cannot_hold_shake_and_are_told(tmp_path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with tl.launch(scene(dt), worlds=1, precision="f64") as sim:
+                frame = sim.forward()
                 for _ in range(3000):
                     frame = sim.step()
                 reached.append(abs(float(frame.joint_q[0, 0])) if not frame.status[0] else np.inf)

@@ -71,7 +71,7 @@ def test_environments_with_the_same_mistake_tell_of_it_once(envs):
     assert len(texts) == 1 and "beyond its bounds" in texts[0]
 
 
-def test_a_fault_is_told_once_for_each_line_that_meets_it():
+def test_a_fault_is_reported_once_for_each_line_that_meets_it():
     def scene() -> tl.Scene:
         made = tl.Scene(gravity=(0, 0, 0))
         made.add_cube()
@@ -99,7 +99,7 @@ def test_a_warning_that_is_an_error_is_one_each_time():
                 advice.warn("said")
 
 
-def test_a_warning_that_was_ignored_is_told_where_it_is_not():
+def test_a_warning_that_was_ignored_is_reported_where_it_is_not():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         advice.warn("hidden")

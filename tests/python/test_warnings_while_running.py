@@ -1,4 +1,4 @@
-"""What is valid while a simulation runs and most likely a mistake: told once, with the cure, at the user's line."""
+"""What is valid while a simulation runs and most likely a mistake: reported once, with the cure, at the user's line."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def nothing_told() -> Iterator[None]:
         yield
 
 
-def test_worlds_that_fault_are_told_once_with_number_first_reason_and_cure():
+def test_worlds_that_fault_are_reported_once_with_number_first_reason_and_cure():
     scene = tl.Scene(gravity=(0, 0, 0))
     scene.add_cube()
     push = np.zeros((4, 6))
@@ -113,7 +114,7 @@ def test_a_fault_as_an_error_leaves_the_simulation_usable():
         assert sim.step(joint_f=np.zeros(6)).step[0] == 1
 
 
-def test_faults_of_an_environment_are_told_at_the_line_that_steps_it():
+def test_faults_of_an_environment_are_reported_at_the_line_that_steps_it():
     envs = VectorEnv(CartPoleBalance, 2)
     try:
         envs.reset(seed=1)
@@ -241,7 +242,7 @@ def test_torques_that_are_meant_to_be_added(scene, aims):
     with tl.launch(scene, worlds=2, params=("joint_target_ke",) if aims == "gains vary" else ()) as sim, nothing_told():
         if aims == "before":
             sim.step(joint_target_q={"arm": [0.1, 0.1]})
-        given = {"joint_target_q": {"arm": [0.1, 0.1]}} if aims == "together" else {}
+        given: dict[str, Any] = {"joint_target_q": {"arm": [0.1, 0.1]}} if aims == "together" else {}
         sim.step(joint_f={"arm": [1.0, 0.0]}, **given)
 
 

@@ -54,7 +54,7 @@ def test_a_copy_has_all_that_it_imports_and_runs(tmp_path):
     assert done.returncode == 0 and (tmp_path / "out/franka_lesson.png").is_file(), done.stderr
 
 
-def test_nothing_is_overwritten_and_wrong_names_are_told(tmp_path):
+def test_nothing_is_overwritten_and_wrong_names_are_reported(tmp_path):
     own = tmp_path / "mine" / "own_task.py"
     own.parent.mkdir()
     own.write_text("changed")

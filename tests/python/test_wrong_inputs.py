@@ -83,12 +83,13 @@ def world(tmp_path_factory) -> Iterator[Any]:
         picture = view.Picture(parts(info["scene"], info["scene_folder"], info["body_names"]), 64, 64)
 
         def send(**commands: Any) -> None:
-            # a wrong number is told by `recv`
+            # a wrong number is reported by `recv`
             sim.send(**commands)
             sim.recv()
 
         def restore(**given: Any) -> Any:
-            return sim.restore(**{"snapshot": snapshot} | given)
+            every: dict[str, Any] = {"snapshot": snapshot, **given}
+            return sim.restore(**every)
 
         def render(**given: Any) -> Any:
             return picture.render(frame, **given)

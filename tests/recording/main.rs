@@ -74,7 +74,7 @@ fn what_a_killed_recorder_has_written_is_replayed_and_the_daemon_goes_on() {
 }
 
 #[test]
-fn a_recorder_that_stands_loses_entries_says_so_and_keeps_nobody_waiting() {
+fn a_recorder_that_stands_loses_entries_reports_it_and_keeps_nobody_waiting() {
     let folder = Folder::new("stands");
     let daemon = Daemon::start("record-stands", &["--worlds", "64"]);
     let client = daemon.attach();
@@ -91,7 +91,7 @@ fn a_recorder_that_stands_loses_entries_says_so_and_keeps_nobody_waiting() {
     let mut news = String::new();
     recorder.news.read_line(&mut news).unwrap();
     assert!(news.contains("after frame 100 a gap"), "{news}");
-    // it says so once it has the state behind the gap
+    // it reports it once it has the state behind the gap
     (0..50).for_each(|key| step(&client, key));
     let (said, code) = recorder.stop();
     assert_eq!(code, 0, "{said}");
@@ -270,7 +270,7 @@ fn unknown_fields_and_counts_of_nothing_are_refused() {
 }
 
 #[test]
-fn a_robot_file_that_has_changed_since_is_told() {
+fn a_robot_file_that_has_changed_since_is_reported() {
     let folder = Folder::new("changed");
     let urdf = folder.file("pole.urdf");
     let robot = |mass: f64| {

@@ -204,7 +204,7 @@ def test_values_that_moved_since_the_rollout_go_on_to_their_targets(tmp_path: Pa
 import ppo, torch
 trainer = ppo.Trainer('CartPoleBalance', 0, ppo.Config(num_envs=8, steps=8), '.', daemon=None, device='cpu')
 rollout, critic = trainer.rollouts[0], trainer.agent.critic
-# whoever acted said 0, the critic that learns says 1, and 5 is right
+# the critic that acted gave 0, the one that learns gives 1, and 5 is right
 critic[-1].bias.data.fill_(1.0)
 rollout.advantage.fill_(5.0)
 trainer.learn(rollout, 0.0)

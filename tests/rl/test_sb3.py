@@ -130,7 +130,7 @@ def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any
         Sb3VecEnv(vector(hasty, 2))
 
 
-def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+def test_torch_has_one_thread_unless_set_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
     for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
         torch.set_num_threads(3)
         made(Sb3VecEnv(hasty, 2, **given))

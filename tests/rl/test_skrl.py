@@ -109,7 +109,7 @@ def test_another_autoreset_mode_is_refused(hasty: Any, vector: Callable[..., Any
         SkrlEnv(vector(hasty, 2, autoreset_mode="SAME_STEP"))
 
 
-def test_torch_has_one_thread_unless_told_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
+def test_torch_has_one_thread_unless_set_otherwise(hasty: Any, made: Callable[[Any], Any]) -> None:
     for given, expected in (({}, 1), ({"torch_threads": 2}, 2), ({"torch_threads": None}, 3)):
         torch.set_num_threads(3)
         made(SkrlEnv(hasty, 2, **given))

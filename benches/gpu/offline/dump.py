@@ -116,7 +116,7 @@ def flat(order: list[Any]) -> list[int]:
 
 
 def vectors(values: npt.NDArray[np.float32], places: int) -> npt.NDArray[np.float32]:
-    """Values `(worlds, n)` as device memory has them, `(vectors, worlds, 4)`, with room for `places` values a world."""
+    """Values `(worlds, n)` as device memory has them, `(vectors, worlds, 4)`, with room for `places` values each."""
     worlds, n = values.shape
     memory = np.zeros((-(-places // WIDTH), worlds, WIDTH), np.float32)
     whole = np.zeros((worlds, -(-n // WIDTH) * WIDTH), np.float32)

@@ -126,6 +126,6 @@ def warp_cycles(tally: Tally, costs: Costs, code: int, hits: float, misses: floa
 
 
 def tiles(worlds: int, places: int) -> int:
-    """Tiles that run one after the other, each with the worlds that a buffer can bind; `places` are values a world."""
+    """Tiles that run one after the other, each with the worlds that a buffer can bind; `places` is values per world."""
     fit = max(c.BINDING // (4 * places), 1)
     return -(-worlds // fit)

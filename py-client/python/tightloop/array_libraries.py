@@ -105,7 +105,7 @@ def check_array(name: str, value: Any, worlds: int, columns: int, device: int) -
         raise CommandRefused(f"{name}: the tensor is on {platform} device {index}, the simulation on cuda:{device}")
     shape = tuple(value.shape)
     if shape not in ((worlds, columns), (columns,)):
-        expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
+        expected = f"expected shape {(worlds, columns)}, or {(columns,)} for all worlds"
         raise CommandRefused(f"{name}: {expected}; got {shape}")
     if "bool" in str(value.dtype) or "complex" in str(value.dtype):
         raise CommandRefused(f"{name}: dtype {value.dtype} is not a real number; give float32")

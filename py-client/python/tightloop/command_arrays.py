@@ -40,7 +40,7 @@ def ready_arrays(
     for name, value in given.items():
         if value is None:
             continue
-        if name == "body_f":  # varies only where the run says so, which `Params` knows
+        if name == "body_f":  # varies only where the run names it, which `Params` knows
             found[name] = params().ready_columns(name, value)
             continue
         columns = {known["name"]: known["columns"] for known in info[group]}

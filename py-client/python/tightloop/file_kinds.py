@@ -1,4 +1,4 @@
-"""What a file is, by its first element or its ending: a wrong one is told with the call that takes it."""
+"""What a file is, by its first element or its ending: the message for a wrong one names the call that takes it."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def instead(call: str, given: Any, wanted: str) -> str | None:
     except (TypeError, RuntimeError):
         return None
     kind = kind_of_file(path)
-    # a missing file is told as such
+    # a missing file has its own message
     if kind is None or kind == wanted or not path.is_file():
         return None
     what, cure = _KINDS[kind]

@@ -43,7 +43,7 @@ def as_array(
     if given.shape not in ((worlds, size), (size,)):
         if not columns:
             raise CommandRefused(f"{what}: nothing of this scene takes it; leave it out")
-        expected = f"expected shape {(worlds, columns)}, or {(columns,)} for every world alike"
+        expected = f"expected shape {(worlds, columns)}, or {(columns,)} for all worlds"
         if base:
             expected += f"; {columns - base} without the {base} of its floating base"
         has_worlds = given.shape[:-1] in ((), (worlds,))
@@ -125,7 +125,7 @@ def as_seed(value: Any, worlds: int) -> NDArray[np.uint64]:
         alone = False
     entries: list[Any] = [value] if alone else list(value)
     if not alone and len(entries) != worlds:
-        raise CommandRefused(f"seed: {len(entries)} seeds for {worlds} worlds; give one, or one a world")
+        raise CommandRefused(f"seed: {len(entries)} seeds for {worlds} worlds; give one, or one per world")
     seeds = []
     for world, entry in enumerate(entries):
         of = "" if alone else f" of world {world}"

@@ -43,6 +43,6 @@ def check_alone(joint_q: Any, joint_qd: Any) -> None:
 
 
 def arrays(state: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
-    """Return what `Sim.write` takes, for all worlds alike; arrays without entries are left out."""
+    """Return what `Sim.write` takes, the same for all worlds; arrays without entries are left out."""
     found = {name: np.array(value, np.float64) for name, value in state.items() if name != "name"}
     return {name: value for name, value in found.items() if value.size}

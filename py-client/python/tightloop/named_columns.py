@@ -146,7 +146,7 @@ def _bodies(what: str, value: Any, worlds: int, bodies: int, parts: int) -> NDAr
 
 def _expected(worlds: int, bodies: tuple[int, ...], parts: int) -> str:
     alike, own = (*bodies, parts), (worlds, *bodies, parts)
-    return f"expected shape {alike} for every world alike, or {own}: the force, then the torque"
+    return f"expected shape {alike} for all worlds, or {own}: the force, then the torque"
 
 
 def _kind(field: str) -> str:

@@ -166,7 +166,7 @@ class Params:
         given = real_numbers(name, value)
         if given.shape not in (shape, shape[1:], ()):
             raise CommandRefused(
-                f"{name}: expected shape {shape}, {shape[1:]} for every world alike, or a number; got {given.shape}"
+                f"{name}: expected shape {shape}, {shape[1:]} for all worlds, or a number; got {given.shape}"
             )
         return np.array(np.broadcast_to(given, shape), dtype=np.float64, order="C").reshape(self._worlds, -1)
 

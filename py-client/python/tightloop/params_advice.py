@@ -1,4 +1,4 @@
-"""Parameters that are written while a simulation runs and are most likely a mistake: told once, with the cure."""
+"""Parameters that are written while a simulation runs and are most likely a mistake: reported once, with the cure."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class Rays:
         if len(shape) != 3 or shape[0] != worlds:
             raise ArgumentError(
                 f"rays: pnt has shape {origins.shape} and vec {directions.shape}; give ({worlds}, rays, 3), "
-                f"(rays, 3) for all {worlds} worlds alike, or (3,) for all rays alike"
+                f"(rays, 3) for rays that all {worlds} worlds share, or (3,) for one vector of all rays"
             )
         check_lengths(directions)
         excluded = self._excluded(bodyexclude, shape[:2])

@@ -147,7 +147,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             A frame of read-only views, which stays valid and unchanged until you drop it.
 
         Warns:
-            TightloopWarning: Worlds faulted, or a value is most likely a mistake; each is told once.
+            TightloopWarning: Worlds faulted, or a value is most likely a mistake; each is reported once.
 
         Raises:
             CommandRefused: A shape, dtype or value is wrong; no world changed.
@@ -286,7 +286,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         given = {"act": act, "ctrl": ctrl, "mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active}
         return self._client.write(joint_q, joint_qd, self._ready(given), mask, False)
 
-    def _ready(self, given: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
+    def _ready(self, given: dict[str, Any]) -> dict[str, Any]:
         return ready_arrays(self.info, lambda: self.params, "writes", given)
 
     def forward(self) -> Frame:
@@ -418,7 +418,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
     def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False, hosts: Sequence[str] = ()) -> Viewer:
         """Open a browser viewer in a separate process, which ends with the simulation.
 
-        Whoever has the ``url`` of the viewer can also drive the simulation while no other client is in control.
+        Anyone who has the ``url`` of the viewer can also drive the simulation while no other client is in control.
 
         Args:
             port: Port of the page on this machine; the next free one if it is taken.

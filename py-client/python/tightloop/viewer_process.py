@@ -22,7 +22,7 @@ class Viewer:
     """A viewer, started by `Sim.view`. It ends with the simulation, with this process, or by ``close``.
 
     Attributes:
-        url: Address of the page. Its token lets whoever has it control the worlds.
+        url: Address of the page. Its token lets anyone who has it control the worlds.
         pid: Process id of the viewer.
     """
 

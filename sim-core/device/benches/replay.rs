@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Runs that count, after as many that do not.
 const RUNS: usize = 400;
 
-/// A program that does next to nothing: what is measured is the way there.
+/// A program that does almost nothing: the bench measures the way there.
 const TINY: &str = "
     @group(0) @binding(0) var<storage, read_write> a: array<f32>;
     @compute @workgroup_size(32) fn tiny(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -153,7 +153,7 @@ impl Inner {
     /// The error of a driver failure: `otherwise`, unless the device is lost.
     pub fn failed(&self, failure: &vulkan::Failure, otherwise: DeviceError) -> DeviceError {
         match failure {
-            vulkan::Failure::Lost => self.lose("the driver says so"),
+            vulkan::Failure::Lost => self.lose("the driver reports it"),
             vulkan::Failure::Other(_) => otherwise,
         }
     }

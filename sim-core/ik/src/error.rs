@@ -64,7 +64,7 @@ pub enum IkError {
         /// The most of a problem.
         max: usize,
     },
-    /// Whoever waited wants it no more.
+    /// Its caller no longer waits for it.
     #[error("it was stopped before all problems were solved; ask again")]
     Stopped,
     /// The processor lacks instructions.

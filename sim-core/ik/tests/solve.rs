@@ -330,7 +330,7 @@ fn out_of_reach<'a>(
 }
 
 #[test]
-fn a_target_out_of_reach_leaves_joints_within_limits_and_says_so() {
+fn a_target_out_of_reach_leaves_joints_within_limits_and_reports_it() {
     let model = fr3();
     let link = ["robot/fr3_hand_tcp"];
     let solver = Solver::new(Arc::clone(&model), &task(&model, &link)).unwrap();

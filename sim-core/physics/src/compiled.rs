@@ -53,7 +53,7 @@ macro_rules! compiled_stages {
         )*
 
         /// Every stage, by its place in the list.
-        // a constant would be compiled by whoever uses it
+        // a constant would be compiled in every crate that uses it
         pub static STAGES: Stages<$scalar> = [$($name),*];
     };
 }

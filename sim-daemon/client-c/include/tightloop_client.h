@@ -323,7 +323,7 @@ tl_status tl_frame_describe(const tl_frame *frame, tl_frame_info *info);
 // Drops a frame: its slot is the daemon's again. NULL does nothing.
 tl_status tl_frame_drop(tl_frame *frame);
 
-// How frames came since the daemon started, or since it was told to `restart` the count, which this call does if
+// How frames came since the daemon started, or since a call had it `restart` the count, which this call does if
 // `restart` is not 0. Without `tightloop serve --realtime`, missed, late and skipped are 0.
 tl_status tl_read_timing(tl_client *client, uint8_t restart, tl_timing *timing);
 

@@ -13,7 +13,7 @@
 //! # Safety
 //! The same holds for every call. A client is one of `tl_attach`, a frame one that a call has stored, or NULL. Texts end with a
 //! NUL byte, arrays have as many entries as their count says, and results go to variables of the caller. NULL is an error.
-//! The header says so too.
+//! The header states it too.
 
 // in the order of the header
 mod status;

@@ -71,7 +71,7 @@ impl From<Timing> for FrameTiming {
     }
 }
 
-/// How frames came since the daemon started, or since it was told to `restart` the count, which this call does if
+/// How frames came since the daemon started, or since a call had it `restart` the count, which this call does if
 /// `restart` is not 0. Without `tightloop serve --realtime`, missed, late and skipped are 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tl_read_timing(

@@ -247,7 +247,7 @@ impl Client {
     /// Puts the worlds under the mask (all without one) back to the start and returns the frame there.
     ///
     /// What of the state the scene has distributions of is drawn from (seed, world, episode). A reset starts the next episode
-    /// of a world; with a seed, one for all or one a world, the first one of that seed. Seed and episode are 0 at first.
+    /// of a world; with a seed, one for all or one per world, the first one of that seed. Seed and episode are 0 at first.
     ///
     /// # Errors
     /// As [`Client::step`].
@@ -415,7 +415,7 @@ impl Client {
     /// As [`Client::latest`].
     pub fn observers(&self, hook: Hook<'_>) -> Result<usize, ProtocolError> {
         self.check_process()?;
-        // whoever only counts takes no seat
+        // an observer that only counts registers no reader
         let own = usize::from(self.observer.take(hook)?.is_some());
         let all = self.connection.ports(hook, transport::watchers)?;
         Ok(all.saturating_sub(own))

@@ -203,7 +203,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Says that we are alive, unless a request that is waited for says so: too many that are unread would push it out.
+    /// Says that we are alive, unless a request that is waited for shows it: too many that are unread would push it out.
     pub(crate) fn beat(&self, epoch: u64) {
         if self.asking.look(|()| ()).is_some() {
             self.post(&Request::Heartbeat { epoch });

@@ -45,7 +45,7 @@ pub enum Request {
     },
     /// How do frames keep their pace? And count anew, if `clear`.
     Timing {
-        /// Forget what was measured, after it is told.
+        /// Forget what was measured, once it is answered.
         clear: bool,
     },
     /// End the daemon.

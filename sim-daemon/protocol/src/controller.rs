@@ -35,7 +35,7 @@ const ACQUIRE_MAX: Duration = Duration::from_secs(10);
 /// How long a daemon is waited for that granted a lease to a call of ours which was interrupted: it misses the holder sooner.
 const ABANDONED_MAX: Duration = Duration::from_secs(2);
 
-/// How long a daemon is waited for that is told of a release.
+/// How long a release waits for the daemon to take note.
 const RELEASE_MAX: Duration = Duration::from_millis(250);
 
 /// The ports of a lease.
@@ -357,7 +357,7 @@ fn open_lease(
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        // a daemon that is told only while we go may not find the message any more, and would wait for us to come
+        // a daemon that we notify only while we go may not find the message any more, and would wait for us to come
         let (release, start) = (Request::Release { epoch: self.epoch }, Instant::now());
         let asked = self.connection.ask_within(RELEASE_MAX, &release, &mut || {
             if start.elapsed() > RELEASE_MAX {

@@ -13,7 +13,7 @@ use crate::paths::{
 };
 use crate::{PROTOCOL_VERSION, ProtocolError};
 
-/// Clients and sweepers hold a lock for microseconds; whoever finds it held that long finds a daemon.
+/// Clients and sweepers hold a lock for microseconds; if it is held longer, a daemon holds it.
 const LOOK_MAX: Duration = Duration::from_millis(500);
 /// A daemon has made the mark of its folder this long after the folder.
 const START_MAX: Duration = Duration::from_secs(60);
@@ -36,7 +36,7 @@ pub struct DaemonLock {
     is_held: Arc<Mutex<bool>>,
 }
 
-/// The files of a [`DaemonLock`], for whoever ends the process without dropping it.
+/// The files of a [`DaemonLock`], for code that ends the process without dropping it.
 #[derive(Debug, Clone)]
 pub struct Remains {
     paths: DaemonPaths,

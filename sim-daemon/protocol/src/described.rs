@@ -65,7 +65,7 @@ fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
 
 /// Tells clients of a damage.
 pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64, damage: Damage) {
-    // one that cannot be told finds out, or waits for as long as it does
+    // one that cannot be notified finds out, or waits for as long as it does
     let _ = private()
         .create(true)
         .truncate(false)

@@ -61,7 +61,7 @@ pub enum ProtocolError {
     NameTaken {
         /// The name.
         name: String,
-        /// The process that holds it, where it says so.
+        /// The process that holds it, where it is known.
         pid: Option<u32>,
     },
 

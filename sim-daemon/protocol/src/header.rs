@@ -1,6 +1,6 @@
 //! Headers of the two kinds of samples, and the row that describes one array in them.
 //!
-//! A sample is lines of eight words, 64-byte aligned: first the field table ([`Row::WORDS`] words a row), then, from the next
+//! A sample is lines of eight words, 64-byte aligned: first the field table ([`Row::WORDS`] words per row), then, from the next
 //! 64-byte boundary, the arrays. Numbers are little endian, as everything that shares memory with us is.
 
 use iceoryx2::prelude::ZeroCopySend;

@@ -8,7 +8,7 @@
 //!                           `place`, locked too, names ROOT and NAME; hash is over both
 //! ```
 //! All of it is for one user only: folders have mode 0700 and files 0600, whatever the umask. Under systemd, `RemoveIPC=no` keeps a daemon's files when its user logs out.
-//! Whoever can take the lock may remove the rest. SHARED is `/dev/shm` on Linux, `/private/var/tmp` on macOS and the user's
+//! A process that can take the lock may remove the rest. SHARED is `/dev/shm` on Linux, `/private/var/tmp` on macOS and the user's
 //! temporary folder on Windows, whatever ROOT is, since the path of a Unix socket is limited to 107 bytes.
 
 use std::fs::{self, File, Metadata};

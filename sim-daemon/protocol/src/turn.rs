@@ -18,7 +18,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// A value that one call at a time uses. Others wait for their turn in the hook's rhythm; a call that the same thread makes
-/// inside a call, from its hook, is told so instead.
+/// inside a call, from its hook, gets an error instead.
 #[derive(Debug)]
 pub(crate) struct Turn<T> {
     state: Mutex<State<T>>,
@@ -157,7 +157,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
-    fn a_call_inside_a_call_is_told_so_and_one_after_it_is_not() {
+    fn a_call_inside_a_call_is_refused_and_one_after_it_is_not() {
         let turn = Turn::new(1);
         let mut held = turn.take(&mut keep_waiting()).unwrap();
         let inside = turn.take(&mut keep_waiting()).map(|_| ());

@@ -170,7 +170,7 @@ fn is_coupled(robot: &Robot, joint: &Joint) -> bool {
     joint.mimic.is_some() || mimics.any(|mimic| robot.joints[mimic.joint].name == joint.name)
 }
 
-/// Whether worlds have values of their own.
+/// Whether values differ between worlds.
 fn varies(scene: &Description, param: Param) -> bool {
     scene.params.contains(&param) || scene.param_ranges.contains_key(&param)
 }

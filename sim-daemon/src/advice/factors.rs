@@ -40,7 +40,7 @@ pub(super) fn advice(scene: &Description, model: &Model) -> Vec<String> {
     all
 }
 
-/// Whether the draws of a gravity or another parameter are told as factors.
+/// Whether the draws of a gravity or another parameter are reported as factors.
 pub(super) fn is_told(param: Param, distribution: &Distribution, own: f64) -> bool {
     is_factor(param, distribution, &[own])
 }

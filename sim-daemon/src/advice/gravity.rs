@@ -34,7 +34,7 @@ fn own(scene: &Description) -> Option<String> {
     Some(format!("{shown}, {told}."))
 }
 
-/// Draws of gravity that point up. Those that look like factors are told as such.
+/// Draws of gravity that point up. Those that look like factors are reported as factors.
 fn drawn(scene: &Description) -> Option<String> {
     let drawn = scene.param_ranges.get(&Param::Gravity)?.get("z")?;
     let least = match *drawn {

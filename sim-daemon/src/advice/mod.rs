@@ -1,4 +1,4 @@
-//! What is valid in a scene and most likely a mistake: told once, when a daemon starts, with the cure.
+//! What is valid in a scene and most likely a mistake: reported once, when a daemon starts, with the cure.
 
 mod draws;
 mod drives;

@@ -140,7 +140,7 @@ fn extent(points: &[[f64; 3]]) -> f64 {
     (0..3).map(edge).fold(0.0, f64::max)
 }
 
-/// Whether worlds have values of their own.
+/// Whether values differ between worlds.
 fn varies(scene: &Description, param: Param) -> bool {
     scene.params.contains(&param) || scene.param_ranges.contains_key(&param)
 }

@@ -6,7 +6,7 @@ use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description, Model};
 use sim_physics::arrays::Field;
 
-/// Depth at the start that is told [m]: grippers and feet are made with less.
+/// Depth at the start that is reported [m]: grippers and feet are made with less.
 const DEPTH: f64 = 0.01;
 /// Pairs that are named.
 const NAMED: usize = 3;

@@ -1,4 +1,4 @@
-//! Numbers of a scene: finite or not, alone or one a dof.
+//! Numbers of a scene: finite or not, alone or one per dof.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -70,7 +70,7 @@ impl<'de> Deserialize<'de> for Number {
 pub enum PerDof<T> {
     /// The same for every dof.
     All(T),
-    /// One a dof, in dof order.
+    /// One per dof, in dof order.
     Each(Vec<T>),
 }
 
@@ -96,7 +96,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for PerDof<T> {
             type Value = PerDof<T>;
 
             fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("one value, or a list with one a dof")
+                formatter.write_str("one value, or a list with one per dof")
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<PerDof<T>, A::Error> {

@@ -165,7 +165,7 @@ struct Drawing {
     parts: Vec<Value>,
     notes: Vec<String>,
     meshes: Vec<TriMesh>,
-    /// Shapes with surfaces in the list, by their sizes or files; what differs in more is told apart by looking.
+    /// Shapes with surfaces in the list, by their sizes or files; what differs in more is compared as a whole.
     places: HashMap<String, Vec<(Shape, usize)>>,
     /// Triangles with surfaces in the list.
     shared: Vec<(Arc<TriMesh>, usize)>,

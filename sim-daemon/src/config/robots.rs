@@ -15,7 +15,7 @@ fn hull_vertices() -> usize {
     MeshOptions::default().max_hull_vertices
 }
 
-/// A robot from a URDF file. Joint values are one number for all dofs, or a list with one a dof.
+/// A robot from a URDF file. Joint values are one number for all dofs, or a list with one per dof.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotTable {

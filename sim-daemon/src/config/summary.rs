@@ -12,8 +12,8 @@ use super::number::Number;
 /// Names, defaults and notes of a URDF file; no limit is `null` for ranges, `"inf"` otherwise.
 ///
 /// Keys: `name`; one entry a moving joint: `joint_names`, `joint_types`, `joint_range` (pairs), `joint_velocity_limit`,
-/// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry a coordinate: `coord_names`, `joint_q`;
-/// one entry a dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_limit_ke`, `joint_limit_kd`, `joint_damping`, `joint_friction`, `joint_armature`;
+/// `joint_mimic` (`null`, or an object with `joint`, `multiplier`, `offset`); one entry per coordinate: `coord_names`, `joint_q`;
+/// one entry per dof: `dof_names`, `dof_driven`, `joint_effort_limit`, `joint_limit_ke`, `joint_limit_kd`, `joint_damping`, `joint_friction`, `joint_armature`;
 /// `link_names` (in body order), `shape_names` (`link/shape`), `notes`, `warnings`.
 ///
 /// # Errors
@@ -75,7 +75,7 @@ pub(crate) fn robot_summary(robot: &Robot) -> Value {
     })
 }
 
-/// What a mesh file becomes: `file`, `scale`, `triangles`, `closed`, `hull_vertices` (a number a hull), `extent`, `notes`.
+/// What a mesh file becomes: `file`, `scale`, `triangles`, `closed`, `hull_vertices` (a number per hull), `extent`, `notes`.
 ///
 /// # Errors
 /// Why the file cannot be used, with the cure.

@@ -170,7 +170,7 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
         _ => failed(out, format!("cannot be made: {error}")),
     };
     if args.force && out.is_file() {
-        // whoever may not write it may not replace it either
+        // a user who may not write it may not replace it either
         output::open(out, OpenOptions::new().write(true)).map_err(not_made)?;
         let part = Part::named(out).map_err(not_made)?;
         return Ok((part.file().map_err(not_made)?, Some(part)));

@@ -142,7 +142,7 @@ fn recorded(out: &Path) -> Record {
 fn a_daemon_whose_device_is_lost_refuses_commands_with_the_reason_and_goes_on() {
     let served = start("lost", 0);
     let (client, hook) = (&served.client, &mut keep_waiting());
-    // the frame that finds it says so of every world
+    // the frame that finds it reports every world
     assert!(is_lost(&client.step(&[], hook).unwrap()));
     let kept = served.root.join("kept");
     let refusals = [
@@ -179,7 +179,7 @@ fn a_daemon_whose_device_is_lost_refuses_commands_with_the_reason_and_goes_on() 
 }
 
 #[test]
-fn a_recorder_that_finds_the_device_lost_is_told_instead_of_a_state() {
+fn a_recorder_that_finds_the_device_lost_gets_an_error_instead_of_a_state() {
     let served = start("lost-state", 0);
     let recorder = attach(&served.root);
     let mut journal = recorder.journal(&[], &mut keep_waiting()).unwrap();
@@ -199,7 +199,7 @@ fn a_recording_ends_before_the_frame_that_found_the_device_lost_and_replays() {
         let (client, args) = (attach(&served.root), recorded(&out));
         std::thread::spawn(move || follow(&client, &args, &AtomicBool::new(false)))
     };
-    // it makes its file once it has joined, and whoever joins after it has the state after it
+    // it makes its file once it has joined, and a recorder that joins after it has the state after it
     let deadline = Instant::now() + Duration::from_secs(60);
     while !out.exists() {
         assert!(Instant::now() < deadline, "no recording begins");

@@ -93,7 +93,7 @@ impl Watched {
             timing.push(told);
             match group.latest(hook) {
                 Ok(Some(frame)) => *seen = Seen::of(&frame),
-                // where all seats are taken, the rest is known without one
+                // where the daemon has no room for another observer, the rest is known without it
                 Ok(None) | Err(ProtocolError::TooManyClients { .. }) => {}
                 Err(error) => return Err(error),
             }

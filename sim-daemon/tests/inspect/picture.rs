@@ -79,7 +79,7 @@ fn a_picture_that_cannot_be_written_is_an_error_with_the_cure() {
     folder.file("a.urdf", &one_link("r", &ball(1.0)));
     let said = inspect(&folder.0, &["a.urdf", "--png", "no/such/r.png"]);
     assert_eq!(said.code, 1);
-    // the rest is told all the same
+    // the rest is reported all the same
     assert!(said.out.starts_with("Robot      r\n") && !said.out.contains("Picture"));
     assert!(
         said.err.contains("no/such/r.png") && said.err.contains("leave it out"),

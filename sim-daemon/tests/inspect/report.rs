@@ -203,7 +203,7 @@ fn a_wrong_inertia_is_mended_with_a_warning_or_refused() {
 }
 
 #[test]
-fn a_misused_command_line_is_told_so() {
+fn a_misused_command_line_gets_an_error() {
     for (arguments, message) in [
         (&["--joint-q", "1,2", "--png", "a.png"][..], "has 2 values"),
         (

@@ -43,7 +43,7 @@ class ContactScene:
     impratio: float = 1000.0
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     by_pairs: bool = True
-    """Whether MuJoCo is told the parameters of each pair; else it finds pairs and parameters by its geoms."""
+    """Whether MuJoCo gets the parameters of each pair; else it finds pairs and parameters by its geoms."""
     surfaces: dict[str, dict] = field(default_factory=dict)
     """By geom, which is named as in ``sim.shape_names``."""
     owners: dict[str, str | None] = field(default_factory=dict)

@@ -44,7 +44,7 @@ class Edge(NamedTuple):
 def random_urdf(seed: int, dofs: int, features: Features = PLAIN) -> str:
     """A robot of so many moving joints; branches, axes, frames and inertias are random, and so is the file's order."""
     rng = np.random.default_rng([seed, dofs])
-    # names sort against the tree's order, so that whoever sorts by name is found out
+    # names sort against the tree's order, so that code that sorts by name fails
     names = [f"l{number:03d}" for number in rng.permutation(1000)]
     root = names.pop()
     links, movers, edges = [root], [], []

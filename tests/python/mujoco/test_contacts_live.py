@@ -1,6 +1,6 @@
 """Contacts against MuJoCo: which there are, what they accelerate, and what they carry.
 
-MuJoCo moves the bodies of each scene for a while; both sides are then asked at states of that motion, one a world.
+MuJoCo moves the bodies of each scene for a while; both sides are then asked at states of that motion, one per world.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import tightloop as tl
 
 # 10,000 configurations, of all kinds together
 WORLDS = 2000
-# How far apart shapes are told of [m]
+# Distance up to which shapes are reported [m]
 FAR = 0.5
 # The cylinder and what it is near, as `add_*` takes them
 CYLINDER = {"radius": 0.06, "half_height": 0.08}

@@ -62,7 +62,7 @@ def test_a_keyframe_of_some_worlds_leaves_the_others(case: Live) -> None:
     np.testing.assert_allclose(frame.act[:, 0], [0, 0.4, 0])
 
 
-def test_names_are_listed_and_wrong_ones_told(case: Live) -> None:
+def test_names_are_listed_and_wrong_ones_reported(case: Live) -> None:
     assert case.sim.keyframe_names == ["m/home", "m/thrown"]
     assert case.sim.mocap_names == ["m/placed"]
     assert case.sim.activation_names == ["m/actuator1"]

@@ -133,7 +133,7 @@ def test_gains_that_a_model_does_not_have_name_the_way_to_actuators():
         model.joint_target_ke = 100.0
 
 
-def test_targets_of_a_model_without_actuators_are_told_with_a_cure_that_works():
+def test_targets_of_a_model_without_actuators_are_reported_with_a_cure_that_works():
     spec = mujoco.MjSpec.from_string(BODY.format(integrator="Euler", actuators="", ctrl="0"))
     for element in [*spec.actuators, *spec.keys]:
         spec.delete(element)

@@ -181,7 +181,7 @@ def test_filters_are_mujocos() -> None:
         np.testing.assert_array_equal(per_ray.dist, mixed.dist)
 
 
-def test_rays_of_all_worlds_alike_need_no_copies() -> None:
+def test_rays_equal_in_all_worlds_need_no_copies() -> None:
     with live(SHAPES, worlds=WORLDS, fields=("body_q",)) as run:
         run.place(run.states(6))
         pnt, vec = (array[0] for array in some_rays(7))

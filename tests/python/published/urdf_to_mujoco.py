@@ -97,7 +97,7 @@ def prefix(joint: ET.Element) -> None:
 
 
 def raise_moments(inertia: ET.Element) -> None:
-    """Moments of a frame that weighs next to nothing, as small as MuJoCo takes them; a zero stays, and is refused."""
+    """Moments of a frame of almost no mass, as small as MuJoCo takes them; a zero stays, and is refused."""
     moments = {name: float(inertia.get(name, 0)) for name in ("ixx", "iyy", "izz")}
     if 0 < max(moments.values()) < MOMENT_MIN:
         for name in moments:

@@ -45,7 +45,7 @@ class Actions:
         self.now, self.before = (np.zeros((worlds, first), np.float32) for _ in range(2))
 
     def take(self, actions: ArrayLike, frame: Any) -> dict[str, NDArray[np.float32]]:
-        """Apply actions, clipped to the action space where the control says so; returns the arguments of a step.
+        """Apply actions, clipped to the action space where the control asks for it; returns the arguments of a step.
 
         Raises:
             ArgumentError: The shape is wrong, or the values are no real numbers.

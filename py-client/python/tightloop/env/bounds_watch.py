@@ -13,7 +13,7 @@ from tightloop.env.task import Observed
 
 #: Worlds that are looked at, calls that make a window, and of how many later calls one is looked at.
 _WORLDS, _WINDOW, _EVERY = 64, 64, 32
-#: Share of a window in which a value is beyond its bounds, from which on that is told.
+#: Share of a window in which a value is beyond its bounds, from which on a warning reports it.
 _SHARE = 0.5
 #: A value this far beyond its bounds, as a share of their distance, is not rounding.
 _SLACK = 1e-3
@@ -47,7 +47,7 @@ class BoundsWatch:
     def look(self, arrays: Sequence[NDArray[Any]]) -> None:
         """Look at the parts of an observation before they are clipped, each ``(worlds,)`` or ``(worlds, size)``."""
         self._calls += 1
-        # the first window looks at each call, so that short runs are told of, too
+        # the first window looks at each call, so that short runs are reported, too
         if self._calls > _WINDOW and self._calls % _EVERY:
             return
         worlds = min(len(arrays[0]), _WORLDS)

@@ -304,7 +304,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         except KeyboardInterrupt:
             self._interrupted = True  # `recv` may be called again, or `reset`
             raise
-        except DaemonLost:  # no reset helps, and the next call says so again
+        except DaemonLost:  # no reset helps, and the next call raises it again
             self._in_flight = False
             raise
         except BaseException:

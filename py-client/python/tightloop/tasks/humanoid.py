@@ -9,7 +9,7 @@
 | 12–34 | joint positions less those of standing | ±4 | rad |
 | 35–57 | joint velocities | ±60 | rad/s |
 | 58–80 | last action | ±4 | – |
-| 81, 82 | sine and cosine of the gait's phase; 0 and 1 when told to stand | ±1 | – |
+| 81, 82 | sine and cosine of the gait's phase; 0 and 1 when commanded to stand | ±1 | – |
 
 | action | range | what 1 means |
 |---|---|---|

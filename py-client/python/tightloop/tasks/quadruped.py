@@ -9,7 +9,7 @@
 | 12–23 | joint positions less those of standing | ±4 | rad |
 | 24–35 | joint velocities | ±60 | rad/s |
 | 36–47 | last action | ±4 | – |
-| 48, 49 | sine and cosine of the gait's phase; 0 and 1 when told to stand | ±1 | – |
+| 48, 49 | sine and cosine of the gait's phase; 0 and 1 when commanded to stand | ±1 | – |
 
 | action | range | what 1 means |
 |---|---|---|

@@ -1,7 +1,7 @@
 """A quadruped follows velocity commands on rough ground, slopes, stairs and blocks; see `tightloop.tasks.velocity`.
 
 The ground is one field of tiles (`tightloop.terrain.mixed`): a column for each kind, a row for each level of
-difficulty. An episode starts in the middle of a tile. A robot that walked most of the way that it was told, and away
+difficulty. An episode starts in the middle of a tile. A robot that walked most of the commanded way, and away
 from the start, begins its next episode a level higher; one that fell or hardly moved begins it a level lower. After the
 hardest level it begins anywhere.
 
@@ -160,7 +160,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         return np.where(level >= LEVELS, np.minimum(anywhere, LEVELS - 1), level)
 
     def remember(self, xp: Namespace, worlds: Worlds, memory: Mapping[str, Array] | None) -> Mapping[str, Array]:
-        """Return what flat ground needs, and how far a robot walked, was told to walk, and was from its start [m]."""
+        """Return what flat ground needs, and how far a robot walked, had to walk, and was from its start [m]."""
         own = super().remember(xp, worlds, memory)
         command, place = worlds.goal[:, :2], worlds.joint_q[:, :2]
         speed = xp.sqrt(squares(xp, command))

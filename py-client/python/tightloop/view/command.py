@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="tightloop view",
         description="Show the worlds of a daemon or a recording in the browser. Prints the address of the page; "
-        "whoever has this address can control the worlds. Stop with Ctrl-C.",
+        "anyone who has this address can control the worlds. Stop with Ctrl-C.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -90,7 +90,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _parsed(arguments: list[str]) -> argparse.Namespace:
-    """Read the arguments; what is wrong with them is told to a process that waits for an answer."""
+    """Read the arguments; a process that waits for an answer gets what is wrong with them."""
     made = parser()
     if any(argument.startswith("--parent") for argument in arguments):
 

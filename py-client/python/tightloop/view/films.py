@@ -50,7 +50,7 @@ class Film:
     second of the run.
 
     The file appears, or replaces an existing one, when the film is complete: at `close`, or at the end of a ``with``
-    block without an error. After an error there is no film, a warning says so, and an existing file is unchanged.
+    block without an error. After an error there is no film, a warning reports it, and an existing file is unchanged.
 
     Attributes:
         pictures: Number of pictures so far.
@@ -234,7 +234,7 @@ def film(
         source: Name of a daemon, a `Sim`, or path of a recording, which ends in ``.tlrec``.
         out: As of `Film`.
         seconds: Length [s]: wall-clock time of a daemon, 5 s if left out; simulated time of a recording, all if left
-            out. The film is shorter if the daemon ends first; a note says so.
+            out. The film is shorter if the daemon ends first; a note reports it.
         at: Start of the film, or time of the picture, after the start of the recording [s]; of a daemon, from now.
         worlds: As of `Film`.
         world: As of `Film`.

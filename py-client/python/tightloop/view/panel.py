@@ -41,7 +41,7 @@ class Panel:
         options: Display options, which the controls write.
         driven: Joints that get sliders.
         aim: Called with the name of a chosen camera preset.
-        notes: What is to be told about the scene's options.
+        notes: What users should know about the scene's options.
         preset: Camera preset at the start.
     """
 

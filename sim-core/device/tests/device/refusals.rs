@@ -143,7 +143,7 @@ fn things_of_another_device_are_refused() {
 }
 
 #[test]
-fn a_lost_device_says_so_and_others_go_on() {
+fn a_lost_device_reports_it_and_others_go_on() {
     for (device, replay) in ways() {
         let other = Device::open(&Choice::First, None).unwrap();
         let (from, to) = (staged(&device, &[1.0; 4]), staged(&device, &[0.0; 4]));

@@ -106,7 +106,7 @@ pub enum BackendError {
         worlds: usize,
     },
     /// Seeds of the wrong number.
-    #[error("seed has {got} entries; give one, or one a world, of which there are {worlds}")]
+    #[error("seed has {got} entries; give one, or one per world, of which there are {worlds}")]
     Seeds {
         /// Entries given.
         got: usize,

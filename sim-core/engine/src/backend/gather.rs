@@ -6,7 +6,7 @@ use sim_physics::lane::{Cx, Num};
 use sim_physics::math::spatial::Spatial;
 use sim_physics::step::{BlockOf, ConstantsOf, mujoco_state};
 
-/// Gathers a field that is neither of contacts nor a counter, one number an element.
+/// Gathers a field that is neither of contacts nor a counter, one number per element.
 #[inline(always)]
 pub(super) fn gather<C: Cx>(
     cx: &mut C,

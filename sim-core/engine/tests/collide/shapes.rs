@@ -153,7 +153,7 @@ fn mesh(hull: &Hull) -> Mesh {
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     pub shapes: [Shape; 2],
-    /// Their axes, one a column.
+    /// Their axes, one per column.
     pub axes: [[Vector; 3]; 2],
     /// Where the second is.
     pub center: Vector,

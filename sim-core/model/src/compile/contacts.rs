@@ -68,7 +68,7 @@ pub(super) fn add_contacts(
     Ok(())
 }
 
-/// Impedances, each once; the table that says which one a pair has; those of each class.
+/// Impedances, each once; the table that says which of them a pair has; those of each class.
 type PairSoftness = (Vec<Impedance<f64>>, Fixed, Vec<Vec<usize>>);
 
 impl ContactBuilder<'_> {

@@ -1,6 +1,6 @@
 //! What a mesh file looks like: triangles in the colours and images of its materials.
 //!
-//! Nothing here has a part in physics. Images are not opened: a texture says which colours whoever does is to look up.
+//! Nothing here has a part in physics. Images are not opened: a texture names the colours that a viewer looks up.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -222,7 +222,7 @@ fn a_cavity_is_subtracted_and_a_part_inside_out_is_turned() {
 }
 
 #[test]
-fn an_open_mesh_weighs_as_its_hull_and_says_so() {
+fn an_open_mesh_weighs_as_its_hull_and_reports_it() {
     let folder = Folder::new("open");
     let mut open = brick();
     open.triangles.remove(3);

@@ -62,7 +62,7 @@ fn limits_dynamics_and_kinds_are_read() {
 }
 
 #[test]
-fn range_with_one_end_takes_0_for_the_other_and_says_so() {
+fn range_with_one_end_takes_0_for_the_other_and_reports_it() {
     let robot = read(&one_joint(
         "revolute",
         "<limit upper=\"1\" effort=\"1\" velocity=\"1\"/>",
@@ -73,7 +73,7 @@ fn range_with_one_end_takes_0_for_the_other_and_says_so() {
 }
 
 #[test]
-fn range_that_is_absent_or_of_no_width_is_none_and_says_so() {
+fn range_that_is_absent_or_of_no_width_is_none_and_reports_it() {
     for limit in [
         "",
         "<limit effort=\"1\" velocity=\"1\"/>",

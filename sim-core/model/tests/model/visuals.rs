@@ -1,4 +1,4 @@
-//! What URDF files say of looks, and that it is told apart from the physics.
+//! What URDF files say of looks, and that it does not change the physics.
 
 use std::fs;
 use std::path::PathBuf;

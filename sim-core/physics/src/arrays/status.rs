@@ -1,4 +1,4 @@
-//! Trouble of one world, as bits of its `status`. 0 = all is well.
+//! Faults of one world, as bits of its `status`; 0 = none.
 
 /// Positions or velocities were no longer finite: the world is frozen at the state before that frame until it is reset.
 pub const NOT_FINITE: u32 = 1;

@@ -310,7 +310,7 @@ arrays! { m;
         Step "step" Counter [] "–" U64, Source::Counter,
             "Control frames since the world's reset.";
         Status "status" Counter [] "–" U32, Source::Counter,
-            "Trouble of the world, as bits: 1 = it was no longer finite, or a command of it where the run freezes for that, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
+            "Faults of the world, as bits: 1 = it was no longer finite, or a command of it where the run freezes for that, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
         ContactsLeftOut "contacts_left_out" Counter [] "–" U32, Source::Counter,
             "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
     }

@@ -175,7 +175,7 @@ impl Inbox {
         }
     }
 
-    /// The mask, one byte a world, if there is one. Its length is not checked.
+    /// The mask, one byte per world, if there is one. Its length is not checked.
     pub fn mask(&self) -> Option<&[u8]> {
         Some(self.bytes(self.table.row(MASK)?))
     }

@@ -10,7 +10,7 @@ use crate::timing::{Percentiles, Timing};
 
 /// A frame that leaves later than due by this share of the period has missed its deadline.
 const TOLERANCE: u64 = 10;
-/// Longest duration that is told from longer ones [ns].
+/// Longest duration that is counted apart from longer ones [ns].
 const LONGEST: u64 = 60_000_000_000;
 /// Digits that are kept of a duration.
 const DIGITS: u8 = 2;

@@ -33,7 +33,7 @@ const HELD_UP: Duration = Duration::from_millis(200);
 pub(super) struct State {
     pub(super) node: Port<Node<S>>,
     pub(super) paths: DaemonPaths,
-    /// Missing pages that clients were told of.
+    /// Missing pages that clients were notified of.
     pub(super) faults: usize,
     pub(super) description: Description,
     pub(super) frame: Table,
@@ -223,7 +223,7 @@ impl State {
         };
         let lines = self.frame.total_bytes() / ALIGNMENT;
         let Some(Ok(mut loan)) = loaned::loan(&lease.publisher, lines) else {
-            // the holder keeps more frames than it said: it is told that its lease is lost
+            // the holder keeps more frames than it said: it gets an error: its lease is lost
             self.record_inputs();
             return self.renew();
         };
@@ -260,7 +260,7 @@ impl State {
         }
         let Some(Ok(sent)) = guarded(|| loaned::send_kept(&mut lease.publisher, loan)) else {
             self.journals.skip();
-            return self.renew(); // the holder cannot be reached: it is told that its lease is lost
+            return self.renew(); // the holder cannot be reached: it gets an error: its lease is lost
         };
         // a holder that cannot be notified looks by itself after 50 ms
         guarded(|| lease.notifier.notify());
@@ -394,7 +394,7 @@ impl State {
             return Ok(None);
         };
         let Some((header, words)) = loaned::received(&sample) else {
-            // its holder is told that its lease is lost
+            // its holder gets an error: its lease is lost
             guarded(|| drop(sample));
             self.renew();
             return Ok(None);

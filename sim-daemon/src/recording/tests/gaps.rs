@@ -71,7 +71,7 @@ fn replay_goes_on_behind_a_gap_and_names_the_steps_that_are_missing() {
 }
 
 #[test]
-fn a_forged_frame_behind_a_gap_is_told() {
+fn a_forged_frame_behind_a_gap_is_reported() {
     let mut recording = with_gap(3, 7, true);
     let digests = torques().total_bytes() / 8;
     let numbers: &mut [u32] =

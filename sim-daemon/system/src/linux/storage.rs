@@ -1,4 +1,4 @@
-//! Files that get a name when they are complete: whoever is killed before leaves nothing.
+//! Files that get a name when they are complete: a process that is killed before leaves nothing.
 
 use std::fs::{File, OpenOptions};
 use std::io;

@@ -14,7 +14,7 @@ static PREVIOUS: AtomicPtr<libc::sigaction> = AtomicPtr::new(null_mut());
 static HANDED_ON: AtomicBool = AtomicBool::new(false);
 
 /// Puts a page of zeros of this process alone in place of a missing page, where `on_missing_page` says that it may. A fault
-/// at any other address goes to whoever handled the signal before.
+/// at any other address goes to the handler before ours.
 ///
 /// Call it again before each mapping: others, such as Python's `faulthandler`, may have put themselves before us. macOS does
 /// not tell a fault from a signal that somebody sent.

@@ -240,7 +240,8 @@ class Batch(NamedViews):
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
 
         The simulations themselves need none: motion and ``subtree_com`` follow expanded fields at once. Limits,
-        contacts and equalities keep the softness of the model, and a warning says so. MuJoCo runs once per simulation.
+        contacts and equalities keep the softness of the model, which a warning reports. MuJoCo runs once
+        per simulation.
 
         Args:
             ids: As in `step`.

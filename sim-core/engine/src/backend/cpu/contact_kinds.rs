@@ -13,7 +13,7 @@ const OWN: usize = 9;
 const SHARED: usize = 3;
 /// Number of different kinds.
 pub(super) const KINDS: usize = 1 << (OWN + SHARED);
-/// Contacts of a class that are told apart: none, one, …, this many or more.
+/// Contacts of a class that are distinguished: none, one, …, this many or more.
 const LEVELS: usize = 4;
 /// Control frames after which the bits are chosen anew; sooner after the start, when robots fall.
 const PERIOD: u64 = 32;

@@ -59,7 +59,7 @@ impl Arena {
         unsafe { self.rows(slot, &(world..world + 1)) }
     }
 
-    /// Writes one number a world.
+    /// Writes one number per world.
     ///
     /// # Safety
     /// As [`Arena::rows`].
@@ -115,7 +115,7 @@ pub(super) unsafe fn export<F: Lane>(
     }
 }
 
-/// From one register an element to one row a world, of as many worlds as there are rows; `lanes` is scratch.
+/// From one register an element to one row per world, of as many worlds as there are rows; `lanes` is scratch.
 #[inline(always)]
 fn unstage<F: Lane>(staging: &[F], lanes: &mut [F::Real], rows: &mut [F::Real]) {
     let n = staging.len();

@@ -169,7 +169,7 @@ fn the_random_states_of_these_tests_take_every_path() {
             hard += usize::from(block.joint_qdd != hurried.joint_qdd);
         }
         println!(
-            "{}: {STATES} states: limits active in {active}, more than one Newton round in {hard}",
+            "{}: {STATES} states: limits active in {active}, more than one Newton iteration in {hard}",
             case.name
         );
         assert!(active > STATES / 4 && active < STATES && hard > STATES / 4);

@@ -106,7 +106,7 @@ impl Worlds for Counted {
     }
 }
 
-/// Serves until told to stop; sends word when clients may come.
+/// Serves until it is stopped; sends word when clients may come.
 fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let daemon_lock = DaemonLock::take(paths).unwrap();
