@@ -7,8 +7,7 @@ const LONGEST: usize = 400;
 /// Most lines of code of a file below.
 const LONGEST_OLDER: usize = 460;
 /// Files that were longer when lines of code were first counted. None joins them, and one that is short enough leaves.
-const OLDER: [&str; 17] = [
-    "docs/generate/benches.py",
+const OLDER: [&str; 16] = [
     "py-client/src/advice.rs",
     "sim-core/model/src/compile/bodies.rs",
     "sim-core/model/tests/geometry/hulls.rs",
@@ -33,7 +32,7 @@ fn of_rust(text: &str) -> usize {
     text.lines().map(str::trim).filter(is_code).count()
 }
 
-/// The same of a Python file, docstrings left out: strings of three quotes that are a statement.
+/// The same of a Python file, docstrings left out: strings of three quotes that begin a line.
 fn of_python(text: &str) -> usize {
     let (mut count, mut is_string, mut is_docstring) = (0, false, false);
     for line in text.lines().map(str::trim) {
@@ -62,6 +61,7 @@ fn lengths() -> Vec<(String, usize)> {
         "examples",
         "sim-core/physics/tests",
         "sim-core/model/tests",
+        "sim-core/record/src",
         "sim-core/record/tests",
         "sim-core/engine/tests",
         "sim-core/device/benches",
