@@ -122,9 +122,8 @@ def interval(values: Sequence[float] | NDArray[Any]) -> tuple[float, float]:
 
 
 def told(found: Mapping[str, float]) -> dict[str, str]:
-    """The numbers of `evaluate`, to be printed."""
-    shown = {name: f"{value:.4g}" for name, value in found.items() if name != "error"}
-    return shown | ({"error": f"{100 * found['error']:.2f} cm"} if "error" in found else {})
+    """The numbers of `evaluate`, to be printed: without units, since a metric's name does not say which it has."""
+    return {name: f"{value:.4g}" for name, value in found.items()}
 
 
 def told_with_intervals(found: Mapping[str, NDArray[Any]]) -> str:

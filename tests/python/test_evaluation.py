@@ -11,7 +11,7 @@ import pytest
 from conftest import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "examples"))
-from evaluation import interval, told_with_intervals
+from evaluation import interval, told, told_with_intervals
 from tightloop.tasks.cartpole import CartPoleBalance
 
 
@@ -70,3 +70,7 @@ def test_a_played_policy_has_a_success_only_if_its_task_has_one(task, end, envs)
     kept = play.play(made, still, 0, None)
     assert ("success" in kept) == (task is Upright)
     assert play.summary("Own", kept) == f"Own: return 5 {end}"
+
+
+def test_a_metric_is_printed_as_the_task_returns_it():
+    assert told({"return": 12.0, "error": 0.25, "angle": 1e-5}) == {"return": "12", "error": "0.25", "angle": "1e-05"}
