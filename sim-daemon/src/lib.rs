@@ -19,6 +19,7 @@ mod groups;
 mod ik;
 mod inspect;
 mod janitor;
+mod least_memory;
 mod list;
 mod log;
 pub mod observe;

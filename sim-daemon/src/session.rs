@@ -23,6 +23,7 @@ use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
 use crate::groups;
 use crate::janitor::Janitor;
+use crate::least_memory::check_least_memory;
 use crate::log::{Log, Streams};
 use crate::pace;
 use crate::server;
@@ -243,6 +244,7 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     let named = serve.params.iter().map(|name| name.trim().to_owned());
     scene.params.extend(named.filter(|name| !name.is_empty()));
     let description = scene.describe(&folder)?;
+    check_least_memory(&description, &options, count)?;
     let model = description.compile()?;
     let layout = Simulation::layout_of(&model, &options);
     let table = export::frame_table(&layout);

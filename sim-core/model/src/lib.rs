@@ -64,4 +64,5 @@ pub use sim_physics::constants::contact::{Cone, FrictionCombine};
 pub use softness::Softness;
 pub use surface::Surface;
 pub use urdf::UrdfOptions;
+pub use validate::check_counts;
 pub use visual::{Look, Visual, Visuals};

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sim_engine::dynamics::Dynamics;
 use sim_model::files;
-use sim_model::{Cone, Description, FrictionCombine, Solver};
+use sim_model::{Cone, Description, FrictionCombine, Solver, check_counts};
 
 use super::bodies::BodyTable;
 use super::error::ConfigError;
@@ -294,6 +294,9 @@ impl SceneFile {
     /// # Errors
     /// A robot file or a value that cannot be used, by name.
     pub fn describe(&self, base_dir: &Path) -> Result<Description, ConfigError> {
+        // a free body has six dofs; large scenes would take minutes to build before these are found
+        let free = self.bodies.iter().filter(|body| !body.fixed).count();
+        check_counts(6 * free, self.shapes.len())?;
         let mut description = Description::new(self.dt.0, self.substeps);
         description.gravity = self.gravity.map(|part| part.0);
         for name in &self.params {

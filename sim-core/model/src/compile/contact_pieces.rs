@@ -2,12 +2,14 @@
 
 use super::carrier::Carrier;
 use crate::description::{ContactPair, Description, Joint, MujocoParts, Robot};
+use crate::error::ModelError;
 use crate::geom_contact::GeomContact;
 use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
 use crate::joint_kind::JointKind;
 use crate::pose::Pose;
 use crate::surface::Surface;
+use crate::value_checks::within;
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, Solid};
 use sim_physics::constants::height_field::FIELD_CONTACTS;
@@ -288,19 +290,31 @@ fn piece(
     }
 }
 
+/// Most pairs of convex pieces that may touch: their tables take some hundred bytes each, and each step reads them.
+const PAIRS_MAX: usize = 1 << 20;
+
 /// Pairs of pieces that may touch, the lower kind first.
+///
+/// # Errors
+/// More of them than a model has room for.
 pub(super) fn pairs(
     shapes: &[PlacedShape<'_>],
     pieces: &[Piece],
     rules: &Rules<'_>,
     filtered: &BTreeSet<[usize; 2]>,
-) -> Vec<(usize, usize)> {
+) -> Result<Vec<(usize, usize)>, ModelError> {
     let mut pairs = Vec::new();
+    let mut found = 0;
     for (j, second) in pieces.iter().enumerate() {
         for (i, first) in pieces[..j].iter().enumerate() {
             let (a, b) = (&shapes[first.shape], &shapes[second.shape]);
             let numbers = [a.number.min(b.number), a.number.max(b.number)];
             if filtered.contains(&numbers) || !may_touch(a, b, rules) {
+                continue;
+            }
+            found += 1;
+            // the message says how many there are, and memory holds no more than can be used
+            if found > PAIRS_MAX {
                 continue;
             }
             pairs.push(match first.solid.kind <= second.solid.kind {
@@ -309,7 +323,15 @@ pub(super) fn pairs(
             });
         }
     }
-    pairs
+    let rule = "at most 1048576 fit; use fewer shapes, give shapes that need not touch one group or a filter, or make a \
+                terrain one height field";
+    within(
+        "the number of pairs of shapes that may touch",
+        found as f64,
+        PAIRS_MAX as f64,
+        rule,
+    )?;
+    Ok(pairs)
 }
 
 /// Whether two geoms of one robot from MuJoCo may touch, as MuJoCo filters them.

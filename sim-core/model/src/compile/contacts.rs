@@ -26,7 +26,7 @@ pub(super) fn add_contacts(
     let mut contacts = Contacts::none(scene.solver.cone, scene.solver.impratio);
     let pieces = pieces(shapes, &mut contacts);
     let filtered = scene.filtered_pairs()?;
-    let mut pairs = pairs(shapes, &pieces, rules, &filtered);
+    let mut pairs = pairs(shapes, &pieces, rules, &filtered)?;
     // by kind, then in scene order
     pairs.sort_by_key(|&(a, b)| (pieces[a].solid.kind, pieces[b].solid.kind, a, b));
     if pairs.is_empty() {

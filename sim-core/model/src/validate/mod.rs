@@ -9,4 +9,5 @@ mod shape;
 mod tree;
 
 pub(crate) use fault::{Culprit, Fault};
+pub use scene::check_counts;
 pub(crate) use shape::{collision_name, shape_sizes};

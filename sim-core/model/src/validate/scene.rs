@@ -21,6 +21,21 @@ const CONTACTS_MAX: usize = 4096;
 /// Most rows of contacts: four for each, which is a pyramid's.
 const ROWS_MAX: usize = 4 * CONTACTS_MAX;
 
+/// Most shapes of a scene besides those of robot files, as many as one robot file may have.
+const SHAPES_MAX: usize = 10_000;
+
+/// Refuses a scene of more dofs or shapes than a model can have, before anything of it is built.
+///
+/// # Errors
+/// [`ModelError::TooManyDofs`], or [`ModelError::OutOfRange`] for the shapes.
+pub fn check_counts(dofs: usize, shapes: usize) -> Result<(), ModelError> {
+    few_dofs("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
+    let rule =
+        "at most 10000 are supported; make a terrain one mesh or height field, or split the scene";
+    let most = SHAPES_MAX as f64;
+    within("the scene's number of shapes", shapes as f64, most, rule)
+}
+
 impl Description {
     /// Checks everything that `compile` relies on.
     ///
@@ -61,6 +76,8 @@ impl Description {
         let rule = "give at most 1e5: beyond, single precision has no digits left for the bodies";
         within("solver impratio", solver.impratio, IMPRATIO_MAX, rule)?;
 
+        let dofs = self.robots.iter().map(Robot::dof_count).sum();
+        check_counts(dofs, self.shapes.len())?;
         let robots = self.robots.iter().map(|robot| robot.name.as_str());
         unique("scene", "robot", robots).map_err(|(_, error)| error)?;
         let shapes = self.shapes.iter().map(|shape| shape.name.as_str());
@@ -79,8 +96,6 @@ impl Description {
         if let Some(rows) = self.rows_max {
             count("rows_max", rows, ROWS_MAX, "it must be between 1 and 16384")?;
         }
-        let dofs = self.robots.iter().map(Robot::dof_count).sum();
-        few_dofs("the scene".to_owned(), dofs, SCENE_DOFS_MAX)?;
         self.robots.iter().try_for_each(Robot::validate)?;
         self.validate_shape_names()?;
         self.validate_sensors()?;
