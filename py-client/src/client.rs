@@ -396,11 +396,19 @@ where
     }
 }
 
-/// Into how many groups the daemon of that name has split its worlds; 1 if it has not.
+/// Into how many groups the daemon of that name has split its worlds; 1 if it has not. One that is not ready is waited for
+/// as long as ``wait`` [s]; left out, only one that starts already.
 #[pyfunction]
-pub(crate) fn groups(py: Python<'_>, name: &str) -> PyResult<usize> {
+#[pyo3(signature = (name, wait=None, /))]
+pub(crate) fn groups(py: Python<'_>, name: &str, wait: Option<f64>) -> PyResult<usize> {
+    let options = AttachOptions {
+        wait: wait
+            .and_then(|wait| Duration::try_from_secs_f64(wait).ok())
+            .unwrap_or_default(),
+        ..AttachOptions::default()
+    };
     waiting(py, |hook| {
-        let beacon = sim_protocol::find(name, &AttachOptions::default(), hook)?;
+        let beacon = sim_protocol::find(name, &options, hook)?;
         Ok(beacon.groups)
     })
     .map_err(|failure| failure.raised(py))

@@ -39,6 +39,7 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         }
         SharedMemory { .. } | Memory { .. } | Descriptors { .. } => "ResourceError",
         NotShared { .. } => "GpuMemoryError",
+        Starting { .. } => "UnknownDaemon",
         Timeout { .. } | Silent { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",
         _ => "TransportError",

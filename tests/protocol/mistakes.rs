@@ -246,6 +246,8 @@ fn a_client_too_many_gets_the_limit_and_may_come_when_another_goes() {
         matches!(error, ProtocolError::TooManyClients { max: 64, .. }),
         "{error}"
     );
+    let holders = format!("which is the limit (process {} has 64)", std::process::id());
+    assert!(error.to_string().contains(&holders), "{error}");
     clients.truncate(63);
     reset(&daemon.attach());
 }

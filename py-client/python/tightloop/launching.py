@@ -21,6 +21,8 @@ from tightloop.sim import Sim
 
 #: How often `attach` looks for a daemon that is still starting [s].
 _ATTACH_SECONDS = 0.02
+# The longest of its waits: ``inf`` is no time of the system's [s].
+_SLICE_SECONDS = 3600.0
 
 
 @overload
@@ -260,7 +262,7 @@ def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
     Args:
         name: Name of the daemon, or ``"franka.0"`` for one of its groups.
         timeout: How long to wait for a daemon that is still starting [s]; ``inf`` is no limit. If left out, the daemon
-            has to be ready.
+            has to be ready, or gets 10 s where it has begun to start.
 
     Returns:
         A `Sim`, or the `Groups` of a daemon with several groups.
@@ -277,7 +279,7 @@ def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
     end = time.monotonic() + seconds
     while True:
         try:
-            return _attach(name)
+            return _attach(name, min(max(end - time.monotonic(), _ATTACH_SECONDS), _SLICE_SECONDS))
         except UnknownDaemon as problem:
             left = end - time.monotonic()
             if left <= 0.0:
@@ -285,7 +287,7 @@ def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
         time.sleep(min(_ATTACH_SECONDS, left))
 
 
-def _attach(name: str) -> Sim | Any:
-    count = _core.groups(name)
+def _attach(name: str, wait: float | None = None) -> Sim | Any:
+    count = _core.groups(name, wait)
     sims = [Sim(_core.Client(own, lease=False), None) for own in _names(name, count)]
     return sims[0] if count == 1 else Groups(name, sims)

@@ -119,7 +119,7 @@ typedef struct tl_frame tl_frame;
 typedef struct {
     // Folder of the daemon's lock file; NULL: $TIGHTLOOP_ROOT, or the folder that `tightloop serve` uses.
     const char *root;
-    // How long to wait for a daemon that does not run yet [s].
+    // How long to wait for a daemon that does not run yet; one that starts already gets 10 s where it is 0 [s].
     double wait_s;
 } tl_options;
 

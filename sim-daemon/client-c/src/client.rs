@@ -31,7 +31,7 @@ pub struct ClientHandle {
 pub struct Options {
     /// Folder of the daemon's lock file; NULL: $TIGHTLOOP_ROOT, or the folder that `tightloop serve` uses.
     pub root: *const c_char,
-    /// How long to wait for a daemon that does not run yet [s].
+    /// How long to wait for a daemon that does not run yet; one that starts already gets 10 s where it is 0 [s].
     pub wait_s: f64,
 }
 

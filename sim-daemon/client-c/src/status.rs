@@ -107,7 +107,7 @@ fn status_of(error: &ProtocolError) -> Status {
         E::ProtocolVersion { .. } => Status::ProtocolVersion,
         E::Handshake { .. } => Status::Handshake,
         E::TooManyClients { .. } => Status::TooManyClients,
-        E::Silent { .. } => Status::Silent,
+        E::Silent { .. } | E::Starting { .. } => Status::Silent,
         E::NotAnInput { .. } | E::NoField { .. } => Status::UnknownName,
         E::Shape { .. } => Status::Shape,
         E::CommandRefused { .. } => Status::Refused,

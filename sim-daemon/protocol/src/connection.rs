@@ -87,7 +87,16 @@ impl Connection {
     fn open_here(peer: Peer) -> Result<(Connection, Announced), ProtocolError> {
         let node =
             transport::node::<S>(&peer.paths.transport_config(peer.beacon.session), "client")?;
-        let wake = transport::open_wake(&node, peer.paths.name())?;
+        let start = Instant::now();
+        let wake = loop {
+            match transport::open_wake(&node, peer.paths.name()) {
+                // the daemon is about to clean up after clients that were killed a moment ago
+                Err(ProtocolError::TooManyClients { .. }) if start.elapsed() < OPEN_MAX => {
+                    std::thread::sleep(PAUSE);
+                }
+                opened => break opened?,
+            }
+        };
         let fact = |key| transport::attribute(&wake, key);
         let (announced, described) = (fact(handshake::PROTOCOL), PROTOCOL_VERSION.to_string());
         if announced != described {

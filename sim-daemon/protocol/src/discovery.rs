@@ -9,15 +9,15 @@ use crate::{PROTOCOL_VERSION, ProtocolError};
 
 /// How long a lock is waited for whose holder does not say who it is.
 const SILENCE_MAX: Duration = Duration::from_secs(2);
-/// How long a daemon is waited for that reads its scene.
-const START_MAX: Duration = Duration::from_secs(120);
+/// How long a daemon is waited for that still starts, where nobody says how long.
+const START_MAX: Duration = Duration::from_secs(10);
 
 /// How to attach.
 #[derive(Debug, Clone, Default)]
 pub struct AttachOptions {
     /// Root folder; [`crate::paths::default_root`] when `None`.
     pub root: Option<PathBuf>,
-    /// How long to wait for a daemon that does not run yet.
+    /// How long to wait for a daemon that does not run yet; zero gives one that starts already 10 s.
     pub wait: Duration,
 }
 
@@ -25,7 +25,8 @@ pub struct AttachOptions {
 ///
 /// # Errors
 /// [`ProtocolError::NoDaemon`], [`ProtocolError::ProtocolVersion`], [`ProtocolError::BadName`],
-/// [`ProtocolError::Interrupted`]; [`ProtocolError::Silent`] when somebody holds the name for too long and does not run.
+/// [`ProtocolError::Interrupted`]; [`ProtocolError::Starting`] when the daemon is not ready in time, and
+/// [`ProtocolError::Silent`] when somebody holds the name for too long and does not run.
 pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beacon, ProtocolError> {
     let paths = DaemonPaths::new(options.root.as_deref(), name)?;
     let (deadline, mut since, mut seen) = (Instant::now() + options.wait, Instant::now(), None);
@@ -34,13 +35,20 @@ pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beaco
         if seen != Some(presence) {
             (since, seen) = (Instant::now(), Some(presence));
         }
-        let silence_max = match presence {
-            Presence::Starting => START_MAX,
-            _ => SILENCE_MAX.max(options.wait),
+        let start_max = match options.wait.is_zero() {
+            true => START_MAX,
+            false => options.wait,
         };
+        let silence_max = SILENCE_MAX.max(options.wait);
         match presence {
             Presence::Running(beacon) => break beacon,
-            Presence::Silent | Presence::Starting if since.elapsed() > silence_max => {
+            Presence::Starting if since.elapsed() > start_max => {
+                return Err(ProtocolError::Starting {
+                    name: name.to_owned(),
+                    seconds: since.elapsed().as_secs_f64(),
+                });
+            }
+            Presence::Silent if since.elapsed() > silence_max => {
                 return Err(ProtocolError::Silent {
                     name: name.to_owned(),
                     path: paths.lock_path(),

@@ -218,7 +218,7 @@ pub enum ProtocolError {
     },
 
     /// As many clients are attached as there is room for.
-    #[error("daemon {name:?} has {max} {what}, which is the limit; close one of them")]
+    #[error("daemon {name:?} has {max} {what}, which is the limit{holders}; close one of them")]
     TooManyClients {
         /// The daemon's name.
         name: String,
@@ -226,6 +226,8 @@ pub enum ProtocolError {
         what: &'static str,
         /// The limit.
         max: usize,
+        /// The processes that hold them, or nothing where that is unknown.
+        holders: String,
     },
 
     /// Shared memory is too small.
@@ -288,6 +290,18 @@ pub enum ProtocolError {
         from: &'static str,
         /// What is wrong.
         problem: String,
+    },
+
+    /// A daemon is not ready in time.
+    #[error(
+        "daemon {name:?} is still starting after a wait of {seconds:.1} s: it reads its scene, builds its worlds or \
+         compiles for a GPU; wait longer (`attach(timeout=60)`, `wait_s` in C), or end it with `tightloop stop {name}`"
+    )]
+    Starting {
+        /// The daemon's name.
+        name: String,
+        /// How long was waited [s].
+        seconds: f64,
     },
 
     /// Something holds a daemon's name and does not become one.

@@ -64,6 +64,7 @@ pub mod paths;
 mod port;
 mod problem;
 mod reentrant;
+mod seats;
 mod service;
 mod stop;
 mod storage;

@@ -20,6 +20,7 @@ use iceoryx2::service::port_factory::{event, publish_subscribe};
 use crate::descriptors;
 use crate::port::Port;
 use crate::problem::{self, Problem};
+use crate::seats::holders;
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
 /// Clients that may observe at once.
@@ -298,6 +299,7 @@ pub(crate) fn watch_subscriber<S: Service>(
                 name: name.to_owned(),
                 what: "observers",
                 max: OBSERVERS_MAX,
+                holders: String::new(),
             })
         }
         Err(error) => Err(ProtocolError::transport("create a frame subscriber", error)),
@@ -416,6 +418,7 @@ pub(crate) fn open_wake<S: Service>(
             name: name.to_owned(),
             what: "clients",
             max: CLIENTS_MAX,
+            holders: holders(node),
         },
         error => ProtocolError::transport("open event wake", error),
     })
