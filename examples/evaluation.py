@@ -122,7 +122,7 @@ def interval(values: Sequence[float] | NDArray[Any]) -> tuple[float, float]:
 
 
 def told(found: Mapping[str, float]) -> dict[str, str]:
-    """The numbers of `evaluate`, to be printed: without units, since a metric's name does not say which it has."""
+    """Format the values of `evaluate` for printing. Names of metrics have no units, so there are none."""
     return {name: f"{value:.4g}" for name, value in found.items()}
 
 

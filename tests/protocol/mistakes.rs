@@ -141,7 +141,11 @@ fn bad_arguments_name_the_culprit_and_the_cure_and_leave_nothing() {
             "ArgumentError",
             "frames-held \"0\"",
         ),
-        (&["--worlds", "4000000000"], "ResourceError", "/dev/shm has"),
+        (
+            &["--worlds", "4000000000"],
+            "ResourceError",
+            "bytes of memory are free",
+        ),
         (&["--log", "/nowhere/log"], "LaunchError", "/nowhere/log"),
     ];
     for (flags, kind, message) in cases {

@@ -1,9 +1,10 @@
-"""Whoever attaches to a daemon that is still starting is answered in the time that was given, with words."""
+"""A client that attaches to a daemon that is still starting gets an answer within its timeout."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -31,6 +32,32 @@ def test_attaching_to_a_start_ends_with_the_timeout_and_says_what_is_waited_for(
         assert timeout <= time.monotonic() - began < timeout + BESIDE_MAX
         daemon.terminate()
         daemon.wait(20.0)
+
+
+def test_a_start_that_begins_late_gets_no_further_timeout(root, unique):
+    name = unique()
+    command = [sys.executable, "-m", "tightloop", "serve", "-", "--name", name]
+    begun = threading.Event()
+
+    def serve() -> None:
+        begun.wait(20.0)
+        time.sleep(1.5)
+        daemons.append(subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL))
+
+    daemons: list[subprocess.Popen[bytes]] = []
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        began = time.monotonic()
+        begun.set()
+        with pytest.raises(UnknownDaemon):
+            tl.attach(name, timeout=3.0)
+        assert time.monotonic() - began < 3.0 + 1.0
+    finally:
+        thread.join()
+        for daemon in daemons:
+            daemon.kill()
+            daemon.wait(20.0)
 
 
 def test_a_daemon_that_becomes_ready_within_the_timeout_is_attached(root, unique):

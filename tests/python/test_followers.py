@@ -99,7 +99,7 @@ def test_a_follower_that_is_given_otherwise_starts_there_and_is_reported(scene):
         np.testing.assert_allclose(sim.forward().joint_q[0], [row(0.5)[0], 0.5, 0.5, 0.0], atol=1e-15)
 
 
-def test_a_follower_whose_leader_puts_it_outside_of_its_limits_is_told(tmp_path):
+def test_a_follower_whose_leader_puts_it_outside_of_its_limits_is_reported(tmp_path):
     joints = {"lead": "", "after": '<mimic joint="lead" multiplier="1" offset="2.5"/>'}
     parts = "".join(LINK.format(name=f"{name}_link") + JOINT.format(name=name, mimic=m) for name, m in joints.items())
     path = tmp_path / "robot.urdf"

@@ -20,7 +20,7 @@ sys.stdin.read()
 """
 
 
-def test_a_client_too_many_is_told_who_holds_the_places_and_comes_in_once_they_are_killed(pendulum):
+def test_a_client_too_many_learns_who_holds_the_places(pendulum):
     with tl.launch(pendulum, worlds=1, device="cpu") as sim:
         # the launching client has one
         command = [sys.executable, "-c", ATTACH, sim.name, str(CLIENTS_MAX - 1)]

@@ -129,7 +129,7 @@ code()  # This too. And this.
     assert (made.count, made.percentile_95, made.longest) == (20, 1, LONG + 2)
 
 
-def test_nobody_is_reported_to_install_the_project_of_another_name():
+def test_no_document_installs_the_project_of_another_name():
     trees = ["docs", "examples", "py-client", "sim-core", "sim-daemon", "tests", "benches"]
     suffixes = {".md", ".py", ".pyi", ".rs", ".txt", ".toml", ".yml"}
     files = [file for tree in trees for file in (REPOSITORY / tree).rglob("*") if file.suffix in suffixes]

@@ -239,7 +239,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "digest",
             "descriptors",
             "device_memory",
-            "seats",
+            "attached",
             "transport",
             "turn",
             "connection",

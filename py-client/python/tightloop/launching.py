@@ -270,6 +270,7 @@ def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
     Raises:
         ArgumentError: The name is not valid for a daemon, or the timeout is not.
         UnknownDaemon: No daemon of that name is running, or was ready in time; the message lists those that are.
+        WaitTimeout: Another program holds the daemon's name, and does not answer.
         ProtocolMismatch: The daemon has another version.
     """
     name = checks.text("attach: name", name, error=ArgumentError)
@@ -283,7 +284,8 @@ def attach(name: str, *, timeout: float | None = None) -> Sim | Any:
         except UnknownDaemon as problem:
             left = end - time.monotonic()
             if left <= 0.0:
-                raise UnknownDaemon(f"{problem} (waited {seconds:g} s for it)") from None
+                waited = "" if "still starting" in str(problem) else f" (waited {seconds:g} s for it)"
+                raise UnknownDaemon(f"{problem}{waited}") from None
         time.sleep(min(_ATTACH_SECONDS, left))
 
 

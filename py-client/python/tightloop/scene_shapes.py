@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+from collections import ChainMap
 from collections.abc import Collection, Container
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from tightloop import _core, checks, height_fields
 from tightloop.attributes import ByName, nearest
@@ -356,7 +357,8 @@ class SceneShapes(SceneOptions):
         return thing
 
     def _names(self) -> Collection[str]:
-        return {**self.shapes, **self.bodies, **self.models, **self.robots}
+        # no copy: a scene asks for a name at every body
+        return cast("Collection[str]", ChainMap[str, Any](self.shapes, self.bodies, self.models, self.robots))
 
     def _free_name(self, kind: str) -> str:
         name, self._numbers[kind] = numbered(kind, self._names(), self._numbers.get(kind, 1))

@@ -3,6 +3,9 @@
 /// Bytes that are looked at.
 const SAMPLE: usize = 4096;
 
+/// What a page of a site that should have been a file is.
+pub(crate) const WEB_PAGE: &str = "this is a web page, not the file; download the raw file";
+
 /// What the bytes of a file hold that is no robot and no mesh, with the cure; `None` where they may be one.
 pub(crate) fn neither_robot_nor_mesh(bytes: &[u8]) -> Option<&'static str> {
     const SIGNATURES: [(&[u8], &str); 9] = [
@@ -36,7 +39,7 @@ pub(crate) fn neither_robot_nor_mesh(bytes: &[u8]) -> Option<&'static str> {
     start
         .get(..doctype.len())
         .is_some_and(|word| word.eq_ignore_ascii_case(doctype))
-        .then_some("this is a web page, not the file; download the raw file")
+        .then_some(WEB_PAGE)
 }
 
 /// The format of a mesh in the bytes of a file, and how such a file's name ends.

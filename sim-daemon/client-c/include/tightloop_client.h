@@ -51,7 +51,7 @@ typedef enum {
     TL_STATUS_HANDSHAKE = 15,
     // The daemon has as many clients as it can have.
     TL_STATUS_TOO_MANY_CLIENTS = 16,
-    // Something holds the daemon's name and is none.
+    // Something holds the daemon's name and does not run: no daemon, or one that is still starting.
     TL_STATUS_SILENT = 17,
     // No field or input has this name; the sentence lists those that are there.
     TL_STATUS_UNKNOWN_NAME = 20,

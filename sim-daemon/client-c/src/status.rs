@@ -35,7 +35,7 @@ pub enum Status {
     Handshake = 15,
     /// The daemon has as many clients as it can have.
     TooManyClients = 16,
-    /// Something holds the daemon's name and is none.
+    /// Something holds the daemon's name and does not run: no daemon, or one that is still starting.
     Silent = 17,
     /// No field or input has this name; the sentence lists those that are there.
     UnknownName = 20,

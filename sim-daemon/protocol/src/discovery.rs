@@ -35,14 +35,14 @@ pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beaco
         if seen != Some(presence) {
             (since, seen) = (Instant::now(), Some(presence));
         }
-        let start_max = match options.wait.is_zero() {
-            true => START_MAX,
-            false => options.wait,
+        let start_end = match options.wait.is_zero() {
+            true => since + START_MAX,
+            false => deadline,
         };
         let silence_max = SILENCE_MAX.max(options.wait);
         match presence {
             Presence::Running(beacon) => break beacon,
-            Presence::Starting if since.elapsed() > start_max => {
+            Presence::Starting if Instant::now() >= start_end => {
                 return Err(ProtocolError::Starting {
                     name: name.to_owned(),
                     seconds: since.elapsed().as_secs_f64(),

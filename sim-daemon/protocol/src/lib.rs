@@ -29,6 +29,7 @@
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
 mod affinity;
+mod attached;
 mod client;
 mod clock;
 mod command;
@@ -64,7 +65,6 @@ pub mod paths;
 mod port;
 mod problem;
 mod reentrant;
-mod seats;
 mod service;
 mod stop;
 mod storage;

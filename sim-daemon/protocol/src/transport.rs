@@ -17,10 +17,10 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 
+use crate::attached::holders;
 use crate::descriptors;
 use crate::port::Port;
 use crate::problem::{self, Problem};
-use crate::seats::holders;
 use crate::{ALIGNMENT, CommandHeader, FrameHeader, JournalHeader, Line, ProtocolError};
 
 /// Clients that may observe at once.

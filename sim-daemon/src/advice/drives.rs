@@ -4,7 +4,7 @@ use sim_model::{Description, Joint, JointDof, JointKind, Model, Robot, TargetMod
 use sim_physics::constants::params::Param;
 
 use super::some;
-use super::values::moving;
+use super::values::{full_name, moving};
 
 /// Share of critical damping below which a drive swings for minutes [–].
 const DAMPED: f64 = 0.01;
@@ -67,7 +67,7 @@ fn aimless(scene: &Description, robot: &Robot, what: &str) -> Option<String> {
     })
 }
 
-/// Stiff drives of joints that next to nothing damps. With inertia I, damping d and stiffness k the share of critical damping
+/// Stiff drives of joints that hardly anything damps. With inertia I, damping d and stiffness k the share of critical damping
 /// is d / (2 √(k I)); dry friction f holds a drive within f / k of its target.
 pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
     let params = [
@@ -100,14 +100,10 @@ pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
             }
         }
         if !names.is_empty() {
-            let kind = match robot.urdf {
-                Some(_) => "robot",
-                None => "body",
-            };
             all.push(format!(
-                "{kind} `{}`: the drives of {} have stiffness and nothing damps them, so they swing about their targets. Set \
+                "{}: the drives of {} have stiffness and nothing damps them, so they swing about their targets. Set \
                  joint_target_kd, to about a tenth of joint_target_ke at first.",
-                robot.name,
+                full_name(robot),
                 some(&names)
             ));
         }

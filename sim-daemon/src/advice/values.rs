@@ -29,11 +29,7 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
     all.extend(sites.filter_map(|site| turned(&format!("site `{}`", site.name), &site.pose)));
     // what MuJoCo compiled has its own conventions, and its own warnings
     for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
-        let kind = match robot.urdf {
-            Some(_) => "robot",
-            None => "body",
-        };
-        let name = format!("{kind} `{}`", robot.name);
+        let name = full_name(robot);
         let base = robot.joints.iter().find(|joint| joint.parent.is_none());
         let start = base.filter(|joint| joint.kind == JointKind::Free);
         let pose = start.map_or(robot.pose, |joint| Pose {
@@ -47,6 +43,15 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
         all.extend(drives::advice(scene, robot, &name));
     }
     all
+}
+
+/// A robot or body with its kind.
+pub(super) fn full_name(robot: &Robot) -> String {
+    let kind = match robot.urdf {
+        Some(_) => "robot",
+        None => "body",
+    };
+    format!("{kind} `{}`", robot.name)
 }
 
 /// A time step that is far too long.

@@ -89,6 +89,11 @@ pub(crate) fn run(args: &Inspect) -> Result<(), DaemonError> {
     drawn.and(printed)
 }
 
+/// Endings of pictures that are not PNG.
+const OTHER_PICTURES: [&str; 9] = [
+    "jpg", "jpeg", "gif", "bmp", "webp", "svg", "pdf", "tif", "tiff",
+];
+
 /// Refuses folders that are not there, and a picture under another format's name.
 fn check_paths(args: &Inspect) -> Result<(), DaemonError> {
     let wrong = |argument, path: &Path, problem: &str| {
@@ -101,11 +106,12 @@ fn check_paths(args: &Inspect) -> Result<(), DaemonError> {
     if let Some(folder) = args.package_dirs.iter().find(|folder| !folder.is_dir()) {
         return wrong("--package-dir", folder, "it is no folder; mend the path");
     }
-    let is_png = |path: &&PathBuf| {
-        let ending = path.extension();
-        ending.is_none_or(|ending| ending.eq_ignore_ascii_case("png"))
+    let is_another = |path: &&PathBuf| {
+        let ending = path.extension().unwrap_or_default();
+        let mut others = OTHER_PICTURES.iter();
+        others.any(|other| ending.eq_ignore_ascii_case(other))
     };
-    match args.png.as_ref().filter(|path| !is_png(path)) {
+    match args.png.as_ref().filter(is_another) {
         Some(path) => wrong("--png", path, "the picture is PNG; end its name in .png"),
         None => Ok(()),
     }

@@ -144,13 +144,22 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         &constraint_of_tie,
     );
     check_models(scene)?;
-    if let Some(parts) = scene.robots.iter().find_map(|robot| robot.mujoco.as_ref()) {
+    let models = || {
+        scene
+            .robots
+            .iter()
+            .filter_map(|robot| robot.mujoco.as_ref())
+    };
+    if let Some(parts) = models().next() {
         constants.mujoco.integrator = parts.integrator;
+        // of several models, what all of them allow
         constants.mujoco.search = Some(Search {
             tolerance: scene.solver.tolerance,
-            ls_tolerance: parts.ls_tolerance,
-            islands: parts.islands,
-            warm_start: parts.warm_start,
+            ls_tolerance: models()
+                .map(|parts| parts.ls_tolerance)
+                .fold(f64::INFINITY, f64::min),
+            islands: models().all(|parts| parts.islands),
+            warm_start: models().all(|parts| parts.warm_start),
             roots: roots(&constants.bodies),
         });
         constants.damped = is_damped(&constants, scene, parts.implicit_damping);
@@ -280,8 +289,6 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
             parts.integrator,
             parts.implicit_damping,
             parts.safe_references,
-            parts.ls_tolerance,
-            [parts.islands, parts.warm_start],
         ))
     };
     let models: Vec<&Robot> = models.collect();
@@ -291,8 +298,7 @@ fn check_models(scene: &Description) -> Result<(), ModelError> {
     {
         return Err(ModelError::MujocoRefused {
             reasons: format!(
-                "models `{}` and `{}` have different integrators, ls_tolerance, or flags eulerdamp, refsafe, \
-                 island or warmstart; make them equal",
+                "models `{}` and `{}` have different integrators, eulerdamp or refsafe; make them equal",
                 two[0].name, two[1].name
             ),
         });

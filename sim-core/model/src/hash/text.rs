@@ -30,11 +30,6 @@ pub(super) trait View {
     fn is_absent(&self) -> bool {
         false
     }
-
-    /// Whether an option of it counts as absent, because models have it that say nothing of it.
-    fn is_default(&self) -> bool {
-        false
-    }
 }
 
 impl Text {
@@ -155,6 +150,10 @@ impl View for f64 {
     fn write(&self, text: &mut Text) {
         text.spell(self);
     }
+
+    fn is_absent(&self) -> bool {
+        self.to_bits() == 0
+    }
 }
 
 impl View for usize {
@@ -203,6 +202,10 @@ impl<T: View, const N: usize> View for [T; N] {
     fn write(&self, text: &mut Text) {
         text.listed(["[", "]"], self.iter().map(|value| value as &dyn View));
     }
+
+    fn is_absent(&self) -> bool {
+        self.iter().all(View::is_absent)
+    }
 }
 
 impl<T: View> View for Option<T> {
@@ -214,7 +217,7 @@ impl<T: View> View for Option<T> {
     }
 
     fn is_absent(&self) -> bool {
-        self.as_ref().is_none_or(View::is_default)
+        self.is_none()
     }
 }
 

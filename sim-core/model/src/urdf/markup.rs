@@ -9,7 +9,7 @@ pub(super) const ATTRIBUTES_OF_ONE_MAX: usize = 64;
 const UNDECLARED_MAX: usize = 16;
 
 /// Whether a text starts with these letters, in upper or lower case.
-fn starts_with(text: &str, ascii: &str) -> bool {
+pub(super) fn starts_with(text: &str, ascii: &str) -> bool {
     text.get(..ascii.len())
         .is_some_and(|start| start.eq_ignore_ascii_case(ascii))
 }

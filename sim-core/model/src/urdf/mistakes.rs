@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 /// Most things in a warning.
 const LISTED_MAX: usize = 8;
-/// Jaro-Winkler similarity of a misspelt name: `orgin`, `dampening` and `multiplicator` have 0.92 or more, and what
-/// simulators add to URDF has less than 0.8.
+/// Jaro-Winkler similarity of a misspelt name: `orgin`, `dampening` and `multiplicator` have 0.92 or more. What simulators
+/// add to URDF has less, or is URDF's name with a word behind it, as `damping_ratio`.
 const SIMILAR: f64 = 0.9;
 /// An angle above a turn is written by nobody who counts radians [rad]; 6.2832 is a turn, rounded.
 const ANGLE_USUAL: f64 = TAU + 0.01;
@@ -87,9 +87,14 @@ pub(super) fn meant(element: &str, name: &str, known: &[&'static str]) -> Option
         return known.iter().copied().find(|known| known == own);
     }
     let likeness = |known: &&str| strsim::jaro_winkler(&name, known);
+    let is_longer = |known: &&str| {
+        let rest = name.strip_prefix(*known);
+        rest.is_some_and(|rest| rest.starts_with(['_', '-']))
+    };
     let nearest = known
         .iter()
         .copied()
+        .filter(|known| !is_longer(known))
         .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
     (likeness(&nearest) >= SIMILAR).then_some(nearest)
 }

@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use super::markup::{ATTRIBUTES_OF_ONE_MAX, Markup};
+use super::markup::{ATTRIBUTES_OF_ONE_MAX, Markup, starts_with};
 use crate::contents;
 use crate::error::ModelError;
 use crate::files::{self, FileError};
@@ -121,6 +121,9 @@ pub(super) fn prepare<'a>(
     }
     let markup = Markup::of(text);
     if let Some(at) = markup.document_type {
+        if starts_with(&text[at..], "<!doctype html") {
+            return Err(refuse(at, contents::WEB_PAGE.to_owned()));
+        }
         let reason = "<!DOCTYPE> is refused, since entities can expand without bound; delete it, and write out what its entities stand for";
         return Err(refuse(at, reason.to_owned()));
     }

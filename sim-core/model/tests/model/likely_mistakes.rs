@@ -87,6 +87,7 @@ fn what_simulators_add_to_urdf_is_no_mistake() {
     for own in [
         "<contact><lateral_friction value=\"1\"/></contact>",
         "<self_collision_checking/>",
+        "<collision_checking/>",
         "<gravity>1</gravity>",
     ] {
         assert_silent(
@@ -99,6 +100,7 @@ fn what_simulators_add_to_urdf_is_no_mistake() {
         "<calibration rising=\"0\"/>",
         "<hardwareInterface/>",
         "<physics/>",
+        "<damping_ratio/>",
     ] {
         assert_silent("<axis", &format!("{own}<axis"));
     }

@@ -51,7 +51,7 @@ arrays! { m;
         joint_q_rest: JointQRest [m.coords] Motion "rad or m";
         joint_qd: JointQd [m.dofs.len()] Motion "rad/s or m/s"
             => "joint_qd" State [Dofs], "Joint velocities.";
-        // the solver's result, and its next start
+        // the solver's result, and its next start: that of `Constants::mujoco_search` between steps in MuJoCo's velocities
         joint_qdd: JointQdd [m.dofs.len()] Motion "rad/s² or m/s²"
             => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
         act: Act [m.mujoco.activations] Motion "–"

@@ -58,7 +58,7 @@ pub fn take_accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf
     for (k, dof) in free_bodies(m) {
         let [linear, angular, spin] = motion_of(cx, b, dof);
         let origin = b.work.origin[k];
-        let angular = &b.work.rotation[k] * angular;
+        let angular = b.work.rotation[k] * angular;
         let swing = spin.cross(spin.cross(origin)) + angular.cross(origin);
         set_accelerations(cx, b, dof, linear - swing, angular);
     }

@@ -223,6 +223,9 @@ impl<'a, 'input> Scene<'a, 'input> {
     }
 }
 
+/// How far exporters in `f32` round entries of a matrix [–].
+const ROUNDED: f64 = 1e-6;
+
 /// One of a node's transformations.
 fn transform(node: Node) -> Result<Affine, String> {
     let values = numbers::<f64>(Some(node))?;
@@ -232,7 +235,9 @@ fn transform(node: Node) -> Result<Affine, String> {
         ("rotate", &[x, y, z, degrees]) => rotation(unit([x, y, z]), degrees.to_radians()),
         ("matrix" | "bind_shape_matrix", values) if values.len() == 16 => {
             let row = |row: usize| [0, 1, 2, 3].map(|column| values[4 * row + column]);
-            if row(3) != [0.0, 0.0, 0.0, 1.0] {
+            let last = row(3).into_iter().zip([0.0, 0.0, 0.0, 1.0]);
+            let errors = last.map(|(value, affine): (f64, f64)| (value - affine).abs());
+            if errors.fold(0.0, f64::max) > ROUNDED {
                 return Err(format!(
                     "the last row of a <matrix> is {:?}; it must be 0 0 0 1, export it again",
                     row(3)

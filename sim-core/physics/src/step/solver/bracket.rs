@@ -201,15 +201,15 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
             let spent = most.lt(cx.get(&evaluations));
             break_if!(cx, spent | answer.has_ended(cx));
             let middle = point!(half * (cx.get(&first.alpha) + cx.get(&second.alpha)));
-            let mut found = zero;
+            let mut answered = zero;
             for candidate in [&from_first, &from_second, &middle] {
                 let costs_less = cx.get(&candidate.cost).lt(cx.get(&answer.cost));
-                let better = costs_less | found.lt(half);
+                let better = costs_less | answered.lt(half);
                 let takes = is_close(cx, candidate) & better;
                 answer.take(cx, takes, candidate);
-                found = C::F::select(takes, one, found);
+                answered = C::F::select(takes, one, answered);
             }
-            break_if!(cx, half.lt(found));
+            break_if!(cx, half.lt(answered));
             let before = from_first.copy(cx);
             let candidates = [&before, &from_second, &middle];
             let first_moved = first.advance(cx, candidates);

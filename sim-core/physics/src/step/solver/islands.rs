@@ -81,8 +81,8 @@ impl<F: Num> Links<'_, F> {
         let count = F::c(self.island.len() as f64);
         let mut least = count + count;
         for root in roots.clone() {
-            let own = self.island[root];
-            least = least.min(F::select(own.lt(count), own, own - count));
+            let current = self.island[root];
+            least = least.min(F::select(current.lt(count), current, current - count));
         }
         let mut last = None;
         for root in roots {
@@ -121,8 +121,8 @@ pub(super) fn trace<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, island: F)
     let zero = F::c(0.0);
     let mut sum = zero;
     for j in 0..m.dofs.len() {
-        let own = w.mass_matrix[m.pattern.at(j, j)];
-        sum = sum + F::select(is_island(w.island[j], island), own, zero);
+        let diagonal = w.mass_matrix[m.pattern.at(j, j)];
+        sum = sum + F::select(is_island(w.island[j], island), diagonal, zero);
     }
     for (k, dof) in free_bodies(m) {
         // an angular velocity e about the frame's origin moves the centre of mass by e × r, with r = -origin
@@ -180,8 +180,8 @@ pub(super) fn force_norm<F: Num>(
 ) -> F {
     let zero = F::c(0.0);
     let mut sum = zero;
-    for (force, own) in force.iter().zip(&w.island) {
-        let force = F::select(is_island(*own, island), *force, zero);
+    for (force, of_dof) in force.iter().zip(&w.island) {
+        let force = F::select(is_island(*of_dof, island), *force, zero);
         sum = force.fma(force, sum);
     }
     for (k, dof) in free_bodies(m) {

@@ -154,7 +154,7 @@ impl<'a, F: Num> Line<'a, F> {
             curvature: self.descent,
             size: slope.abs(),
         };
-        // equalities have one piece only; of the others those of joints are told apart once, not row by row
+        // equalities have one piece only; of the others those of joints are distinguished once, not row by row
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
         let (weight, jar, jv) = (self.weight, self.jar, self.jv);
         let shares = cx.lanes() > 1;
