@@ -214,13 +214,12 @@ fn on_gpu(
     let crowd = WorldSet::all(worlds);
     let options = options(place, worlds, &FIELDS);
     let words = Simulation::layout_of(&plan.model, &options).bytes / 8;
-    // before the worlds, so that the pages are there until those are gone
     let mut pages = Pages::new(words)?;
     let mut heap = vec![0; words];
     let (mut sim, build_s) = build(plan, &options)?;
     let staged = Frames::measure(&mut sim, plan, &crowd, &mut heap, wanted)?;
-    // SAFETY: the pages go after the worlds, and no one else has them.
-    let imports = !arguments.no_import && unsafe { sim.import(pages.words()) };
+    let owner = pages.owner();
+    let imports = !arguments.no_import && sim.import(pages.words(), &|| Some(owner.clone()));
     let imported = imports
         .then(|| Frames::measure(&mut sim, plan, &crowd, pages.words(), wanted))
         .transpose()?;

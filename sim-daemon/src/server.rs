@@ -1,9 +1,12 @@
 //! The loop of a daemon: one command in, one frame out.
 
+use std::ptr::NonNull;
+use std::sync::Arc;
 use std::time::Instant;
 
+use sim_engine::backend::HostPages;
 use sim_engine::simulation::Simulation;
-use sim_protocol::host::{Host, Next, Worlds};
+use sim_protocol::host::{FrameMemory, Host, Next, Pages, Worlds};
 use sim_protocol::{Op, RefusalKind};
 
 use crate::device_memory;
@@ -42,7 +45,7 @@ fn serve(
     let watched = host.description().watch_worlds;
     loop {
         let next = host.wait()?;
-        // other memory may lie where the frames of the last lease lay
+        // of a lease that has ended, nothing is kept
         if host.lease() != lease {
             simulation.forget();
             lease = host.lease();
@@ -66,7 +69,6 @@ fn serve(
                         let mut shown = Shown {
                             simulation,
                             advance,
-                            is_leased: true,
                             watched,
                         };
                         host.answer(started, &mut shown);
@@ -85,7 +87,6 @@ fn serve(
                     let mut shown = Shown {
                         simulation,
                         advance: Advance::Step,
-                        is_leased: false,
                         watched,
                     };
                     host.advance(&mut scratch, &mut shown);
@@ -100,7 +101,6 @@ fn serve(
                 let mut shown = Shown {
                     simulation,
                     advance: Advance::Forward,
-                    is_leased: false,
                     watched,
                 };
                 host.show(&mut scratch, &mut shown);
@@ -109,6 +109,8 @@ fn serve(
             Next::DeviceMemory => {
                 host.deliver(|host| device_memory::share(simulation, host.frame_slots()));
             }
+            // told above
+            Next::LeaseEnded => {}
             Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),
         }
@@ -153,18 +155,15 @@ fn record_state(simulation: &Simulation, host: &mut Host, all: bool) {
 struct Shown<'a> {
     simulation: &'a mut Simulation,
     advance: Advance,
-    /// The arena is of a lease, not of our own.
-    is_leased: bool,
     /// Worlds that observers see.
     watched: usize,
 }
 
 impl Worlds for Shown<'_> {
-    fn frame(&mut self, arena: &mut [u64]) -> bool {
-        if self.is_leased {
-            // SAFETY: the frames of a lease stay where they are as long as it lasts, and their heads are written before and
-            // after.
-            unsafe { self.simulation.import(arena) };
+    fn frame(&mut self, arena: &mut [u64], memory: Option<&FrameMemory>) -> bool {
+        if let Some(memory) = memory {
+            self.simulation
+                .import(arena, &|| Some(Arc::new(FramePages(memory.pages(arena)?))));
             if let Some(sharing) = self.simulation.sharing() {
                 sharing.assign_slot(arena);
             }
@@ -183,6 +182,20 @@ impl Worlds for Shown<'_> {
     fn state(&mut self, to: &mut [u8]) -> bool {
         self.simulation.snapshot_first(self.watched, to);
         self.simulation.lost().is_none()
+    }
+}
+
+/// Pages that frames lie in.
+struct FramePages(Arc<Pages>);
+
+// SAFETY: a lease's own file is mapped for writing and by whole pages, as long as they are owned.
+unsafe impl HostPages for FramePages {
+    fn start(&self) -> NonNull<u8> {
+        self.0.start()
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.bytes().next_multiple_of(4096) // no page is smaller
     }
 }
 

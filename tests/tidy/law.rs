@@ -361,9 +361,9 @@ pub const DOORS: [(&str, &str); 23] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 48] = [
+pub const UNSAFE: [&str; 45] = [
     "py-client/src/frame.rs",                      // NumPy views
-    "sim-core/device/src/memory.rs",               // imports pages of the host
+    "sim-core/device/src/host_pages.rs",           // imports pages of the host
     "sim-core/device/src/portable.rs",             // programs without checks at run time
     "sim-core/device/src/software/exit.rs",        // process exit beside a driver thread
     "sim-core/device/src/vulkan/export.rs",        // the driver's memory for other processes
@@ -378,10 +378,7 @@ pub const UNSAFE: [&str; 48] = [
     "sim-core/engine/src/backend/cpu/dispatch.rs", // instruction sets
     "sim-core/engine/src/backend/cpu/run.rs",      // calls the stages of an instruction set
     "sim-core/engine/src/backend/cpu/transfer.rs", // rows of a frame, written by several threads
-    "sim-core/engine/src/backend/gpu/backend.rs",  // as imported.rs
     "sim-core/engine/src/backend/gpu/imported.rs", // memory of readers that a device writes to
-    "sim-core/engine/src/backend/mod.rs",          // as imported.rs
-    "sim-core/engine/src/simulation.rs",           // as imported.rs
     "sim-core/ik/src/dispatch.rs",                 // instruction sets
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
     "sim-core/physics/src/lane/simd/neon.rs", // intrinsics

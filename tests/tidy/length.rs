@@ -7,7 +7,7 @@ const LONGEST: usize = 400;
 /// Most lines of code of a file below.
 const LONGEST_OLDER: usize = 460;
 /// Files that were longer when lines of code were first counted. None joins them, and one that is short enough leaves.
-const OLDER: [&str; 16] = [
+const OLDER: [&str; 15] = [
     "py-client/src/advice.rs",
     "sim-core/model/src/compile/bodies.rs",
     "sim-core/model/tests/geometry/hulls.rs",
@@ -16,7 +16,6 @@ const OLDER: [&str; 16] = [
     "sim-core/record/src/wgsl/mod.rs",
     "sim-core/record/tests/toy/program.rs",
     "sim-daemon/picture/src/tests/mod.rs",
-    "sim-daemon/protocol/src/host/state.rs",
     "sim-daemon/src/export.rs",
     "sim-daemon/src/recording/record.rs",
     "sim-daemon/src/session.rs",

@@ -3,6 +3,7 @@
 use crate::adapter::{AdapterInfo, Choice, choose, ready};
 use crate::cache::Cache;
 use crate::error::DeviceError;
+use crate::host_pages::HostPages;
 use crate::vulkan::{self, Vulkan};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,6 +28,8 @@ pub(crate) struct Inner {
     reports: Arc<Reports>,
     /// Size of the largest buffer [bytes].
     pub buffer_max: u64,
+    /// Imported pages of buffers that went after the device was lost. Last: the device is closed before they may be unmapped.
+    pub kept_pages: Mutex<Vec<Arc<dyn HostPages>>>,
 }
 
 /// Errors that wgpu reports outside of calls; the first of each kind is kept.
@@ -107,6 +110,7 @@ impl Device {
                 cache,
                 compiling: AtomicUsize::new(0),
                 reports,
+                kept_pages: Mutex::default(),
             }),
         })
     }

@@ -27,7 +27,8 @@
 //!
 //! # Memory
 //! wgpu zeroes memory lazily where it has not seen a write. It takes imported buffers as written, so this crate clears every buffer
-//! that it makes. A staging buffer is locked while a batch that names it runs.
+//! that it makes. A staging buffer is locked while a batch that names it runs. Pages of the host that are imported stay mapped as long
+//! as the buffer over them, which owns them too ([`HostPages`]).
 //!
 //! # Failures
 //! Out of memory, a lost device and a driver that compiles too long are errors, never panics. Code that exists for Mesa's software
@@ -51,6 +52,7 @@ mod compile;
 mod device;
 mod encode;
 mod error;
+mod host_pages;
 mod memory;
 mod module;
 mod portable;
@@ -73,6 +75,7 @@ pub use batch::{Batch, BatchBuilder, Replay};
 pub use cache::bound;
 pub use device::Device;
 pub use error::DeviceError;
+pub use host_pages::HostPages;
 pub use memory::{Buffer, Read, Staging, Write};
 pub use module::translated;
 pub use program::Program;

@@ -4,6 +4,7 @@ use crate::adapter::ready;
 use crate::allocation::{GRAIN, Residence, USAGES};
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
+use crate::host_pages::Pinned;
 use crate::vulkan;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -12,7 +13,7 @@ use std::sync::{Arc, RwLock, RwLockReadGuard, RwLockWriteGuard};
 #[derive(Clone)]
 pub struct Buffer(pub(crate) Arc<Memory>);
 
-/// Memory of a buffer. Field order matters: the buffers are dropped before the device.
+/// Memory of a buffer. Field order matters: the buffers are dropped before the device and before the pages under them.
 pub(crate) struct Memory {
     pub label: String,
     /// Size that was asked for [bytes]; what is allocated is a multiple of `GRAIN`.
@@ -23,6 +24,8 @@ pub(crate) struct Memory {
     /// The host's side of a staging buffer.
     pub host: Option<HostSide>,
     pub device: Arc<Inner>,
+    /// The host's pages, where they were imported.
+    pub _pinned: Option<Pinned>,
 }
 
 impl Memory {
@@ -221,24 +224,6 @@ impl Device {
         Ok(self.named(label, bytes, wgpu, raw, host))
     }
 
-    /// Imports host pages as a buffer: programs and copies access them in place.
-    ///
-    /// Errors: `DeviceError::Import` if the driver refuses; nothing has changed then.
-    ///
-    /// # Safety
-    /// `at` is mapped for `bytes`, readable and writable, for as long as the buffer or a batch that names it lives, and nobody
-    /// relies on its contents while a batch that writes them runs.
-    pub unsafe fn import(&self, at: *mut u8, bytes: u64) -> Result<Buffer, DeviceError> {
-        self.inner.alive()?;
-        let made = match &self.inner.vulkan {
-            // SAFETY: as promised by the caller.
-            Some(vulkan) => unsafe { vulkan.import(&self.inner.wgpu, at, bytes) },
-            None => Err("only Vulkan can".to_owned()),
-        };
-        let (wgpu, raw, _) = made.map_err(|reason| DeviceError::Import { reason })?;
-        Ok(self.named("imported", bytes, wgpu, Some(raw), None))
-    }
-
     pub(crate) fn named(
         &self,
         label: &str,
@@ -254,6 +239,7 @@ impl Device {
             wgpu,
             host,
             device: self.inner.clone(),
+            _pinned: None,
         }))
     }
 }

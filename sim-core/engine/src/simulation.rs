@@ -8,7 +8,7 @@ pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
 
 use crate::backend::sharing::Sharing;
-use crate::backend::{Backend, BackendError};
+use crate::backend::{Backend, BackendError, HostPages};
 use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_model::Model;
@@ -154,14 +154,16 @@ impl Simulation {
     }
     /// Lets a GPU write into this arena whenever it is stepped into; false if it cannot, and on the CPU, which always writes there.
     ///
-    /// # Safety
-    /// Its memory stays mapped where it is, to the same pages, until [`Simulation::forget`] or the end of the simulation, and
-    /// nothing else that lies in its pages is written during a step.
-    pub unsafe fn import(&mut self, arena: &mut [u64]) -> bool {
-        // SAFETY: by contract.
-        unsafe { self.backend.import(arena) }
+    /// The `owner` of its pages is asked for when the arena comes for the first time. The GPU owns them too from then on, until
+    /// [`Simulation::forget`] or the end of the simulation.
+    pub fn import(
+        &mut self,
+        arena: &[u64],
+        owner: &dyn Fn() -> Option<Arc<dyn HostPages>>,
+    ) -> bool {
+        self.backend.import(arena, owner)
     }
-    /// Forgets all imported arenas, whose memory may be unmapped, and the memory of a GPU that a client maps.
+    /// Forgets all imported arenas, whose pages go with their last owner, and the memory of a GPU that a client maps.
     pub fn forget(&mut self) {
         self.backend.forget();
     }

@@ -4,10 +4,12 @@
 //! zeros of this process alone ([`sim_system::faults`]), and the daemon that the file belongs to is noted as damaged: its
 //! clients get an error at their next call.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::io;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Weak};
 
 use memmap2::{MmapOptions, MmapRaw};
 use sim_system::faults;
@@ -60,12 +62,52 @@ fn used() -> &'static [Slot] {
     &SLOTS[..USED.load(Ordering::Acquire).min(MAPPINGS_MAX)]
 }
 
-/// A mapped file.
+/// The pages of a mapped file: they stay where they are until the last owner goes.
 #[derive(Debug)]
-pub(crate) struct Mapping {
-    pages: MmapRaw,
+pub struct Pages {
+    raw: MmapRaw,
     slot: usize,
 }
+
+impl Pages {
+    /// The first byte, at the begin of a page.
+    pub fn start(&self) -> NonNull<u8> {
+        NonNull::new(self.raw.as_mut_ptr()).expect("nothing is mapped at zero")
+    }
+
+    /// Bytes of the file.
+    pub fn bytes(&self) -> usize {
+        self.raw.len()
+    }
+
+    /// Whether these words lie in them as a whole.
+    pub(crate) fn hold(&self, words: &[u64]) -> bool {
+        SLOTS[self.slot].holds(words.as_ptr() as usize, size_of_val(words))
+    }
+}
+
+impl Drop for Pages {
+    fn drop(&mut self) {
+        // before the pages go
+        SLOTS[self.slot].end.store(0, Ordering::Release);
+        SLOTS[self.slot].taken.store(false, Ordering::Release);
+    }
+}
+
+thread_local! {
+    static NOTED: RefCell<Option<Vec<Weak<Pages>>>> = const { RefCell::new(None) };
+}
+
+/// Also says which files this thread has mapped meanwhile so that it may write to them.
+pub(crate) fn noted<T>(make: impl FnOnce() -> T) -> (T, Vec<Weak<Pages>>) {
+    NOTED.set(Some(Vec::new()));
+    let made = make();
+    (made, NOTED.take().unwrap_or_default())
+}
+
+/// A mapped file.
+#[derive(Debug)]
+pub(crate) struct Mapping(Arc<Pages>);
 
 impl Mapping {
     /// Maps the first bytes of a file of an owner, made here or not.
@@ -82,25 +124,25 @@ impl Mapping {
         unsafe { faults::replace_missing_pages(on_missing_page) };
         let mut options = MmapOptions::new();
         options.len(bytes);
-        let pages = match may_write {
+        let raw = match may_write {
             true => options.map_raw(file)?,
             false => options.map_raw_read_only(file)?,
         };
-        let slot = register(pages.as_ptr() as usize, bytes, owner, is_made);
+        let slot = register(raw.as_ptr() as usize, bytes, owner, is_made);
         let slot = slot.ok_or(io::ErrorKind::OutOfMemory)?;
-        Ok(Mapping { pages, slot })
+        let pages = Arc::new(Pages { raw, slot });
+        if may_write {
+            NOTED.with_borrow_mut(|noted| {
+                noted
+                    .iter_mut()
+                    .for_each(|n| n.push(Arc::downgrade(&pages)))
+            });
+        }
+        Ok(Mapping(pages))
     }
 
     pub(crate) fn start(&self) -> NonNull<u8> {
-        NonNull::new(self.pages.as_mut_ptr()).expect("nothing is mapped at zero")
-    }
-}
-
-impl Drop for Mapping {
-    fn drop(&mut self) {
-        // before the pages go
-        SLOTS[self.slot].end.store(0, Ordering::Release);
-        SLOTS[self.slot].taken.store(false, Ordering::Release);
+        self.0.start()
     }
 }
 

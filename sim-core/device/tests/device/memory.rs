@@ -3,13 +3,32 @@
 use crate::common::{copy, device, fetch, numbers, program, scale_add, staged, ways};
 use rustix::fs::{MemfdFlags, ftruncate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
-use sim_device::{AdapterKind, DeviceError, Replay};
+use sim_device::{AdapterKind, Device, DeviceError, HostPages, Replay};
+use std::ops::Range;
+use std::ptr::NonNull;
+use std::sync::Arc;
 
 /// Size of the shared pages [bytes].
 const PAGES: usize = 1 << 20;
 
 /// A mapping of shared pages.
-struct Mapping(*mut u8);
+struct Mapping(NonNull<u8>);
+
+// SAFETY: it is no thread's own, and what batches write is read after them.
+unsafe impl Send for Mapping {}
+// SAFETY: as above.
+unsafe impl Sync for Mapping {}
+
+// SAFETY: mapped in `new` until drop; only one that may be written is imported.
+unsafe impl HostPages for Mapping {
+    fn start(&self) -> NonNull<u8> {
+        self.0
+    }
+
+    fn bytes(&self) -> usize {
+        PAGES
+    }
+}
 
 impl Mapping {
     fn new(file: &impl rustix::fd::AsFd, access: ProtFlags) -> Mapping {
@@ -24,38 +43,53 @@ impl Mapping {
                 0,
             )
         };
-        Mapping(at.unwrap().cast())
+        Mapping(NonNull::new(at.unwrap().cast()).unwrap())
     }
 
     fn numbers(&self) -> &[f32] {
         // SAFETY: mapped until drop, and no batch runs while it is viewed.
-        unsafe { std::slice::from_raw_parts(self.0.cast(), PAGES / 4) }
+        unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), PAGES / 4) }
     }
 }
 
 impl Drop for Mapping {
     fn drop(&mut self) {
         // SAFETY: the mapping is this one's.
-        unsafe { munmap(self.0.cast(), PAGES).unwrap() };
+        unsafe { munmap(self.0.as_ptr().cast(), PAGES).unwrap() };
     }
 }
 
-#[test]
-fn what_a_program_writes_into_imported_pages_is_read_through_another_mapping() {
-    let device = device();
+/// A file of shared pages.
+fn shared_pages() -> rustix::fd::OwnedFd {
+    let file = memfd_create("tightloop-import", MemfdFlags::CLOEXEC).unwrap();
+    ftruncate(&file, PAGES as u64).unwrap();
+    file
+}
+
+const WRITABLE: ProtFlags = ProtFlags::READ.union(ProtFlags::WRITE);
+
+/// Whether the driver refuses such pages, as the software driver does not.
+fn refuses_pages(device: &Device) -> bool {
     if !device.info().imports {
         let name = &device.info().name;
         let software = device.info().kind == AdapterKind::Software;
         assert!(!software, "lavapipe takes pages of shared memory");
         eprintln!("skipped: the driver of {name} refuses pages of shared memory");
+    }
+    !device.info().imports
+}
+
+#[test]
+fn what_a_program_writes_into_imported_pages_is_read_through_another_mapping() {
+    let device = device();
+    if refuses_pages(&device) {
         return;
     }
-    let file = memfd_create("tightloop-import", MemfdFlags::CLOEXEC).unwrap();
-    ftruncate(&file, PAGES as u64).unwrap();
-    let written = Mapping::new(&file, ProtFlags::READ | ProtFlags::WRITE);
+    let file = shared_pages();
+    let written = Arc::new(Mapping::new(&file, WRITABLE));
     let other = Mapping::new(&file, ProtFlags::READ);
-    // SAFETY: `written` outlives buffer and batch.
-    let pages = unsafe { device.import(written.0, PAGES as u64) }.unwrap();
+    // SAFETY: what batches write is read after them.
+    let pages = unsafe { device.import(written, 0..PAGES) }.unwrap();
     let input: Vec<f32> = (0..PAGES / 4).map(|i| i as f32).collect();
     let from = staged(&device, &input);
     let whole = 0..PAGES as u64;
@@ -78,16 +112,66 @@ fn what_a_program_writes_into_imported_pages_is_read_through_another_mapping() {
 }
 
 #[test]
+fn imported_pages_are_mapped_until_the_last_batch_over_them_is_gone() {
+    if refuses_pages(&device()) {
+        return;
+    }
+    let file = shared_pages();
+    let other = Mapping::new(&file, ProtFlags::READ);
+    for (replay, is_lost, value) in [
+        (Replay::Recorded, false, 3.0),
+        (Replay::Encoded, false, 4.0),
+        (Replay::Recorded, true, 5.0),
+    ] {
+        let device = device();
+        let written = Arc::new(Mapping::new(&file, WRITABLE));
+        let owner = Arc::downgrade(&written);
+        // SAFETY: what batches write is read after them.
+        let pages = unsafe { device.import(written, 4096..8192) }.unwrap();
+        let from = staged(&device, &[value; 8]);
+        let mut batch = device.batch(replay);
+        batch.copy(&from, 0, &pages, 32, 32);
+        let batch = batch.finish().unwrap();
+        drop(pages);
+        assert!(owner.strong_count() > 0, "{replay:?}");
+        device.run(&[&batch]).unwrap();
+        assert_eq!(other.numbers()[1024 + 8..][..8], [value; 8]);
+        if is_lost {
+            device.lose();
+            device.run(&[&batch]).unwrap_err();
+        }
+        drop(batch);
+        // a lost device may still write
+        assert_eq!(owner.strong_count(), usize::from(is_lost), "{replay:?}");
+        drop((device, from));
+        assert_eq!(owner.strong_count(), 0, "{replay:?}");
+    }
+}
+
+#[test]
 fn pages_that_cannot_be_imported_are_refused_and_the_device_goes_on() {
     for (device, replay) in ways() {
-        let mut memory = vec![0_u8; 3 * 65536];
-        let at = memory.as_mut_ptr();
-        let odd = at.wrapping_add(1 + at.align_offset(65536));
-        for (place, bytes) in [(odd, 65536), (at, 0)] {
+        let pages = Arc::new(Mapping::new(&shared_pages(), WRITABLE));
+        let owner = Arc::downgrade(&pages);
+        let backwards = Range {
+            start: 8192,
+            end: 4096,
+        };
+        for range in [
+            1..65537,
+            0..0,
+            0..PAGES + 4096,
+            PAGES..usize::MAX,
+            backwards,
+        ] {
             // SAFETY: nothing is imported.
-            let failure = unsafe { device.import(place, bytes) }.err().unwrap();
+            let failure = unsafe { device.import(pages.clone(), range) }
+                .err()
+                .unwrap();
             assert!(matches!(failure, DeviceError::Import { .. }), "{failure}");
         }
+        drop(pages);
+        assert_eq!(owner.strong_count(), 0);
         let from = staged(&device, &[3.0; 8]);
         let to = device.buffer("to", 32).unwrap();
         device.run(&[&copy(&device, replay, &from, &to)]).unwrap();

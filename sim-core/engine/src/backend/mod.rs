@@ -16,10 +16,12 @@ pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 pub use input::{Input, Values};
 pub use profile::{Histogram, Profile, StageProfile};
+pub use sim_device::HostPages;
 
 use crate::random::Numbering;
 use sharing::Sharing;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Bytes of a world's counters in a record: steps `u64`, status `u32`, contacts left out `u32`, seed `u64`, episode `u32`,
 /// little endian.
@@ -218,12 +220,9 @@ pub trait Backend: Send {
     fn copied(&self) -> u64 {
         0
     }
-    /// Lets the device write into this arena whenever [`Backend::run`] gets it; false if it cannot.
-    ///
-    /// # Safety
-    /// Its memory stays mapped where it is, to the same pages, until [`Backend::forget`] or the end of the backend, and nothing
-    /// else that lies in its pages is written while it runs.
-    unsafe fn import(&mut self, _arena: &mut [u64]) -> bool {
+    /// Lets the device write into this arena whenever [`Backend::run`] gets it; false if it cannot. The `owner` of its pages is asked
+    /// for the first time, and kept until [`Backend::forget`].
+    fn import(&mut self, _arena: &[u64], _owner: &dyn Fn() -> Option<Arc<dyn HostPages>>) -> bool {
         false
     }
     /// Forgets all arenas that were imported, and the memory that a client maps.

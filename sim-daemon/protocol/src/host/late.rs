@@ -12,7 +12,7 @@ impl State {
     /// Advances the worlds by the step in the inbox, which no client sent.
     pub(super) fn advance(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
         let started = Instant::now();
-        let is_good = worlds.frame(arena);
+        let is_good = worlds.frame(arena, None);
         self.frames += 1;
         self.observers.changed();
         let now = Instant::now();

@@ -1,11 +1,13 @@
 //! The services of one lease, at the daemon.
 
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::S;
+use crate::mapping::{self, Pages};
 use crate::memory::slot_bytes;
 use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher, Waker};
 use crate::{ProtocolError, Table};
@@ -15,6 +17,24 @@ const SILENCE_MAX: Duration = Duration::from_secs(2);
 /// A holder that was granted the lease and did not open its services within this time is gone.
 const JOIN_MAX: Duration = Duration::from_millis(800);
 
+/// The shared memory that the frames of a lease lie in.
+#[derive(Debug, Default)]
+pub struct FrameMemory(Vec<Weak<Pages>>);
+
+impl FrameMemory {
+    /// The pages that an arena lies in, which stay mapped as long as they are owned. Who owns them lets go of them at
+    /// [`super::Next::LeaseEnded`]: until then there may be no room for another lease.
+    pub fn pages(&self, arena: &[u64]) -> Option<Arc<Pages>> {
+        let mut pages = self.0.iter().filter_map(Weak::upgrade);
+        pages.find(|pages| pages.hold(arena))
+    }
+
+    /// Whether somebody owns some of it.
+    pub(super) fn is_owned(&self) -> bool {
+        self.0.iter().any(|pages| pages.strong_count() > 0)
+    }
+}
+
 /// One lease: free until somebody is granted it.
 #[derive(Debug)]
 pub(super) struct Lease {
@@ -23,6 +43,7 @@ pub(super) struct Lease {
     pub(super) last_seq: u64,
     pub(super) subscriber: CommandSubscriber<S>,
     pub(super) publisher: FramePublisher<S>,
+    pub(super) memory: FrameMemory,
     pub(super) notifier: Waker<S>,
     commands: CommandService<S>,
 }
@@ -45,7 +66,9 @@ impl Lease {
         frames_held: usize,
     ) -> Result<Lease, ProtocolError> {
         let frames = transport::create_frames(node, epoch, frames_held)?;
-        let publisher = transport::frame_publisher(&frames, slot_bytes(frame))?;
+        let (publisher, pages) =
+            mapping::noted(|| transport::frame_publisher(&frames, slot_bytes(frame)));
+        let publisher = publisher?;
         let notifier = transport::notifier(&transport::create_event(
             node,
             &format!("obs/{epoch}"),
@@ -59,6 +82,7 @@ impl Lease {
             last_seq: 0,
             subscriber,
             publisher,
+            memory: FrameMemory(pages),
             notifier,
             commands,
         })

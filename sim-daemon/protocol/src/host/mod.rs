@@ -2,6 +2,7 @@
 //! It knows no physics.
 
 mod cleanup;
+mod handover;
 mod inbox;
 mod journal;
 mod late;
@@ -20,8 +21,12 @@ use std::time::{Duration, Instant};
 
 pub use cleanup::ClientCleanup;
 pub use inbox::{Inbox, Numbers};
+pub use lease::FrameMemory;
 pub use worlds::{Next, Worlds};
 
+pub use crate::mapping::Pages;
+
+use self::handover::Handover;
 use self::journal::Journals;
 use self::lease::Lease;
 use self::observers::Observers;
@@ -110,6 +115,7 @@ impl Host {
             description,
             frame,
             lease: Some(lease),
+            handover: Handover::default(),
             journals: Journals::default(),
             epochs: 1,
             responder,
@@ -157,9 +163,13 @@ impl Host {
     /// # Errors
     /// [`ProtocolError::Transport`]; [`ProtocolError::Damaged`] when other programs leave nothing to serve with.
     pub fn wait(&mut self) -> Result<Next, ProtocolError> {
+        self.state.hand_over();
         loop {
             if let Some(next) = guarded(|| self.look()) {
                 self.panics = 0;
+                if let Ok(Next::LeaseEnded) = next {
+                    self.state.handover.tell();
+                }
                 return next;
             }
             self.panics += 1;
@@ -311,7 +321,7 @@ impl Host {
     pub fn show(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
         let (began, state) = (Instant::now(), &mut self.state);
         state.frames += 1;
-        if worlds.frame(arena) {
+        if worlds.frame(arena, None) {
             let head = header(&state.description, &state.frame, state.frames);
             state
                 .observers

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::Node;
 
+use super::Inbox;
+use super::handover::Handover;
 use super::journal::{Journals, Occasion, RECORDERS_MAX};
 use super::lease::Lease;
 use super::observers::Observers;
 use super::pace::Pacer;
 use super::worlds::{Next, S, Worlds};
-use super::{ClientCleanup, Inbox};
 use crate::affinity::CoreAffinity;
 use crate::clock;
 use crate::control::{Request, Response};
@@ -38,6 +39,8 @@ pub(super) struct State {
     pub(super) description: Description,
     pub(super) frame: Table,
     pub(super) lease: Option<Lease>,
+    /// What keeps the next lease from being opened.
+    pub(super) handover: Handover,
     pub(super) journals: Journals,
     pub(super) epochs: u64,
     pub(super) responder: Responder<S>,
@@ -54,68 +57,6 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Ends a lease that is over, makes the next one ready.
-    fn renew(&mut self) {
-        // the old slots go first: there may not be room for both
-        let old = self.lease.take();
-        self.pacer.rest();
-        guarded(|| drop(old));
-        self.epochs += 1;
-        // without room now, the next request for a lease tries again and reports why
-        let open = || {
-            let held = self.description.frames_held;
-            Lease::open(&self.node, self.epochs, &self.frame, held)
-        };
-        self.lease = guarded(open).and_then(Result::ok);
-    }
-
-    /// Lets go of everybody who uses memory that makes no sense; they may come again.
-    pub(super) fn lose_clients(&mut self) {
-        self.journals.lose();
-        self.renew();
-    }
-
-    fn acquire(&mut self, pid: u32) -> Response {
-        if let Some(lease) = &mut self.lease
-            && lease.holder.is_some()
-        {
-            ClientCleanup::new(&self.node).clean();
-            if lease.is_over() || lease.is_silent() {
-                self.renew();
-            }
-        }
-        if self.lease.is_none() {
-            let needed = memory::lease_bytes(&self.description, &self.frame);
-            match memory::check(memory::free(), needed, 0, "a lease") {
-                Err(
-                    ProtocolError::SharedMemory { free, needed, .. }
-                    | ProtocolError::Memory { free, needed, .. },
-                ) => {
-                    return Response::NoMemory { free, needed };
-                }
-                Err(error) => {
-                    return Response::Refused {
-                        reason: error.to_string(),
-                    };
-                }
-                Ok(()) => self.renew(),
-            }
-        }
-        match &mut self.lease {
-            None => Response::Refused {
-                reason: "the services of a new lease could not be created".to_owned(),
-            },
-            Some(Lease {
-                holder: Some(holder),
-                ..
-            }) => Response::Held { pid: holder.pid },
-            Some(lease) => {
-                lease.grant(pid);
-                Response::Granted { epoch: lease.epoch }
-            }
-        }
-    }
-
     /// Opens a journal, if there is room for it.
     fn journal(&mut self, observed: u64) -> Response {
         let refused = |reason| Response::Refused { reason };
@@ -161,7 +102,7 @@ impl State {
 
     /// Answers the control requests that are there.
     fn control(&mut self) -> Option<Next> {
-        let (mut end, mut later) = (false, Vec::new());
+        let (mut end, mut later) = (false, self.handover.waiting());
         // as with commands: a client that was killed while it connected is no reason to end
         while let Ok(Some(active)) = self.responder.receive() {
             let response = match serde_json::from_slice(active.payload()) {
@@ -211,8 +152,10 @@ impl State {
             respond(&active, &response);
         }
         for (active, pid) in later {
-            let response = self.acquire(pid);
-            respond(&active, &response);
+            match self.acquire(pid) {
+                Some(response) => respond(&active, &response),
+                None => self.handover.postpone(active, pid),
+            }
         }
         end.then_some(Next::End)
     }
@@ -230,7 +173,7 @@ impl State {
         let words = loaned::words(loan.payload_mut());
         let (head, arena) = words.split_at_mut(Table::head_bytes(self.frame.rows().len()) / 8);
         head[..self.frame.words().len()].copy_from_slice(self.frame.words());
-        let is_good = worlds.frame(arena);
+        let is_good = worlds.frame(arena, Some(&lease.memory));
         let on_device = worlds.on_device();
         self.frames += 1;
         self.observers.changed();
@@ -370,8 +313,9 @@ impl State {
             self.journals.lose();
             false
         });
+        let ended = self.handover.is_due().then_some(Next::LeaseEnded);
         let visits = self.visitor.is_some().then_some(Next::DeviceMemory);
-        next.or(visits).or(waits.then_some(Next::Record))
+        next.or(ended).or(visits).or(waits.then_some(Next::Record))
     }
 }
 

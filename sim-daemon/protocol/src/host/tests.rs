@@ -341,3 +341,17 @@ fn a_client_that_goes_while_its_card_is_waited_for_holds_nobody_up() {
     drop(first);
     assert_eq!(count(&second.step(&[], hook).unwrap()), 1);
 }
+
+#[test]
+fn a_lease_waits_for_the_owner_of_the_last_one_and_clients_come_and_go() {
+    let fake = Fake::start("handover");
+    let hook: Hook<'_> = &mut keep_waiting();
+    for round in 1..=5 {
+        let client = fake.attach();
+        let frame = client.step(&[], hook).unwrap();
+        assert_eq!(count(&frame), round);
+        assert_eq!(frame.header().epoch, round);
+        drop(frame);
+        client.release(hook).unwrap();
+    }
+}

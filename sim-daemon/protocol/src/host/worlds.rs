@@ -1,5 +1,6 @@
 //! What a host and the daemon's loop ask of each other.
 
+use super::lease::FrameMemory;
 use crate::service::OneThread;
 
 /// The daemon uses its services from one thread.
@@ -7,8 +8,9 @@ pub(super) type S = OneThread;
 
 /// What a host asks for: frames, and for observers the state behind them.
 pub trait Worlds {
-    /// Writes the arena of a frame; returns whether there is something to be seen and recorded in it.
-    fn frame(&mut self, arena: &mut [u64]) -> bool;
+    /// Writes the arena of a frame, which lies in the memory of a lease, or in the daemon's own; returns whether there is something to
+    /// be seen and recorded in it.
+    fn frame(&mut self, arena: &mut [u64], memory: Option<&FrameMemory>) -> bool;
     /// The slot of device memory that has the last frame too, and the value of the timeline of frames when it is written.
     fn on_device(&mut self) -> Option<(usize, u64)> {
         None
@@ -29,6 +31,8 @@ pub enum Next {
     Observe,
     /// The holder of the lease wants device memory: [`super::Host::deliver`].
     DeviceMemory,
+    /// A lease has ended, and somebody owns pages of its [`FrameMemory`]: they are to be let go of before the next wait.
+    LeaseEnded,
     /// A recorder wants the state of all worlds to begin with: [`super::Host::record_state`].
     Record,
     /// Somebody asked the daemon to end.

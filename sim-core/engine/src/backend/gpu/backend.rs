@@ -14,12 +14,12 @@ use crate::backend::{
 };
 use crate::random::Numbering;
 use crate::start::StartDraw;
-use sim_device::{Buffer, Device, Staging};
+use sim_device::{Buffer, Device, HostPages, Staging};
 use sim_physics::arrays::Array;
 use sim_physics::arrays::{Layout, status};
 use sim_physics::constants::Constants;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The backend of one group of worlds. Field order matters: batches are dropped before buffers and programs, and those before the device.
 pub(super) struct Gpu {
@@ -259,25 +259,23 @@ impl Backend for Gpu {
         Some(self)
     }
 
-    unsafe fn import(&mut self, arena: &mut [u64]) -> bool {
-        let place = arena.as_mut_ptr() as usize;
+    fn import(&mut self, arena: &[u64], owner: &dyn Fn() -> Option<Arc<dyn HostPages>>) -> bool {
+        let place = arena.as_ptr() as usize;
+        // nothing else can lie there: its pages are owned
         if self.imported.iter().any(|(known, _)| *known == place) {
             return true;
         }
-        if !self.imports {
+        let Some(owner) = self.imports.then(owner).flatten() else {
             return false;
-        }
-        // SAFETY: by contract.
-        let imported = unsafe {
-            Imported::new(
-                &self.device,
-                &self.compiled,
-                &self.tiles,
-                arena,
-                self.layout.bytes,
-                self.drawn.as_ref(),
-            )
         };
+        let imported = Imported::new(
+            &self.device,
+            &self.compiled,
+            &self.tiles,
+            arena,
+            self.layout.bytes,
+            (owner, self.drawn.as_ref()),
+        );
         match imported {
             Ok(imported) => {
                 self.imported.push((place, imported));

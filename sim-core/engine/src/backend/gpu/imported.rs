@@ -2,10 +2,10 @@
 
 use super::compiled::Compiled;
 use super::tile::Tile;
-use super::words;
 use crate::backend::BackendError;
-use sim_device::{Batch, Buffer, Device};
+use sim_device::{Batch, Buffer, Device, DeviceError, HostPages};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Reader memory that frames are written to.
 pub(super) struct Imported {
@@ -54,26 +54,26 @@ pub(super) fn record(
 }
 
 impl Imported {
-    /// Imports the pages of an arena.
-    ///
-    /// # Safety
-    /// The pages stay mapped where they are, to the same memory, until the backend is dropped.
-    pub unsafe fn new(
+    /// Imports the pages of an arena, which the batches own from then on.
+    pub fn new(
         device: &Device,
         compiled: &Compiled,
         tiles: &[Tile],
-        arena: &mut [u64],
+        arena: &[u64],
         bytes: usize,
-        drawn: Option<&Buffer>,
+        (owner, drawn): (Arc<dyn HostPages>, Option<&Buffer>),
     ) -> Result<Imported, BackendError> {
         const PAGE: usize = 4096;
-        let place = arena.as_mut_ptr() as usize;
+        let place = arena.as_ptr() as usize;
         let (first, end) = (place / PAGE * PAGE, (place + bytes).next_multiple_of(PAGE));
-        let before = place - first;
-        let at = words::bytes(arena).as_mut_ptr().wrapping_sub(before);
-        // SAFETY: whole pages, mapped by contract.
-        let pages = unsafe { device.import(at, (end - first) as u64)? };
-        let before = before as u64;
+        let start = owner.start().as_ptr() as usize;
+        let inside = first.checked_sub(start).zip(end.checked_sub(start));
+        let (first_inside, end_inside) = inside.ok_or_else(|| DeviceError::Import {
+            reason: "the arena lies before its pages".to_owned(),
+        })?;
+        // SAFETY: batches write the arena alone, and run only while `Backend::run` borrows it.
+        let pages = unsafe { device.import(owner, first_inside..end_inside)? };
+        let before = (place - first) as u64;
         let drawn = drawn.map_or(Drawn::InPlace, |own| Drawn::Apart(own, 0..own.bytes()));
         let target = Target(&pages, before);
         let shown = record((device, compiled, tiles), drawn, target, bytes as u64)?;

@@ -20,9 +20,8 @@
 //!
 //! # A frame
 //! A frame of a tile is recorded once: waiting commands, substeps, fault checks, evaluation, then a batch that writes the output. Where
-//! the driver imports host memory, the output goes into the memory of its readers (`imported`). Otherwise the processor copies it once
-//! from a staging buffer, and counts the bytes. Programs write to host memory
-//! at once; a frame with contacts is drawn in device memory first.
+//! the driver imports host memory, the output goes into the memory of its readers (`imported`), which its batches own until the lease ends.
+//! Otherwise the processor copies it once from a staging buffer, and counts the bytes. Programs write to host memory at once; a frame with contacts is drawn in device memory first.
 //!
 //! # The host's part
 //! The host mirrors seeds, episodes, parameters and counters (`mirror`). It draws starts and noise by the functions of the CPU backend

@@ -90,11 +90,18 @@ fn description() -> Description {
     }
 }
 
-/// Worlds whose frames and state are a number; the state takes a time to give.
-struct Counted(u64, Duration);
+/// Worlds whose frames and state are a number; the state takes a time to give. They own the pages of frames, as a GPU does.
+struct Counted<'a>(u64, Duration, &'a mut Vec<Arc<Pages>>);
 
-impl Worlds for Counted {
-    fn frame(&mut self, arena: &mut [u64]) -> bool {
+impl Worlds for Counted<'_> {
+    fn frame(&mut self, arena: &mut [u64], memory: Option<&FrameMemory>) -> bool {
+        if let Some(memory) = memory {
+            let pages = memory.pages(arena).expect("the frame lies in them");
+            if !self.2.iter().any(|owned| Arc::ptr_eq(owned, &pages)) {
+                self.2.push(pages);
+            }
+            assert_eq!(self.2.len(), 1, "those of one lease");
+        }
         arena[..2].fill(self.0);
         true
     }
@@ -113,7 +120,7 @@ fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: D
     let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
     let mut cleanup = host.client_cleanup();
     ready.send(()).unwrap();
-    let mut count = 0;
+    let (mut count, mut owned) = (0, Vec::new());
     loop {
         match host.wait().unwrap() {
             Next::Command if host.inbox().on_device().is_some() => {
@@ -130,14 +137,19 @@ fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: D
             }
             Next::Command => {
                 count += 1;
-                host.answer(Instant::now(), &mut Counted(count, takes));
+                host.answer(Instant::now(), &mut Counted(count, takes, &mut owned));
             }
-            Next::Observe => host.show(&mut [0; 8], &mut Counted(count, takes)),
+            Next::Observe => host.show(&mut [0; 8], &mut Counted(count, takes, &mut owned)),
             Next::DeviceMemory => host.deliver(|host| {
                 let slots = host.frame_slots();
                 Err(format!("no card for {slots} slots"))
             }),
             Next::Late => unreachable!("it keeps no pace"),
+            Next::LeaseEnded => {
+                // nobody else has them, and there is no other lease before they go
+                assert_eq!(owned.drain(..).map(Arc::into_inner).flatten().count(), 1);
+                assert_eq!(host.lease(), 0);
+            }
             Next::Record => host.record_state(&[count as u8; STATE], false),
             Next::End => break,
         }

@@ -1,0 +1,140 @@
+//! From one lease to the next.
+
+use super::ClientCleanup;
+use super::lease::Lease;
+use super::state::State;
+use super::worlds::S;
+use crate::ProtocolError;
+use crate::control::Response;
+use crate::guard::guarded;
+use crate::memory;
+use crate::transport::Asked;
+
+/// A lease that has ended, and the next one, for which there may be no room while somebody owns pages of the last.
+#[derive(Default)]
+pub(super) struct Handover {
+    stage: Stage,
+    /// Who wants the next lease, and in which process.
+    waiting: Vec<(Asked<S>, u32)>,
+}
+
+#[derive(Default, PartialEq)]
+enum Stage {
+    /// No pages of another lease are owned.
+    #[default]
+    Over,
+    /// The owner has not been told.
+    Owned,
+    /// The owner has been told.
+    Told,
+}
+
+impl Handover {
+    /// Whether the owner of the pages must be told that their lease has ended.
+    pub(super) fn is_due(&self) -> bool {
+        self.stage == Stage::Owned
+    }
+
+    /// The owner of the pages is told, and lets go of them before it waits again.
+    pub(super) fn tell(&mut self) {
+        self.stage = Stage::Told;
+    }
+
+    /// Keeps a request for a lease until there is room for one.
+    pub(super) fn postpone(&mut self, active: Asked<S>, pid: u32) {
+        self.waiting.push((active, pid));
+    }
+
+    /// The requests that were kept.
+    pub(super) fn waiting(&mut self) -> Vec<(Asked<S>, u32)> {
+        std::mem::take(&mut self.waiting)
+    }
+}
+
+impl State {
+    /// Ends a lease that is over, makes the next one ready.
+    pub(super) fn renew(&mut self) {
+        // the old slots go first: there may not be room for both
+        let old = self.lease.take();
+        self.pacer.rest();
+        if let Some(mut old) = old {
+            let memory = std::mem::take(&mut old.memory);
+            guarded(|| drop(old));
+            if memory.is_owned() {
+                self.handover.stage = Stage::Owned;
+            }
+        }
+        if self.handover.stage == Stage::Over {
+            self.open_lease();
+        }
+    }
+
+    /// Makes a lease ready that had to wait for the owner of pages of the last.
+    pub(super) fn hand_over(&mut self) {
+        if self.handover.stage == Stage::Told {
+            self.handover.stage = Stage::Over;
+            self.open_lease();
+        }
+    }
+
+    fn open_lease(&mut self) {
+        self.epochs += 1;
+        // without room now, the next request for a lease tries again and reports why
+        let open = || {
+            let held = self.description.frames_held;
+            Lease::open(&self.node, self.epochs, &self.frame, held)
+        };
+        self.lease = guarded(open).and_then(Result::ok);
+    }
+
+    /// Lets go of everybody who uses memory that makes no sense; they may come again.
+    pub(super) fn lose_clients(&mut self) {
+        self.journals.lose();
+        self.renew();
+    }
+
+    /// Grants the lease, or says why not; nothing as long as the last one is handed over.
+    pub(super) fn acquire(&mut self, pid: u32) -> Option<Response> {
+        if let Some(lease) = &mut self.lease
+            && lease.holder.is_some()
+        {
+            ClientCleanup::new(&self.node).clean();
+            if lease.is_over() || lease.is_silent() {
+                self.renew();
+            }
+        }
+        if self.handover.stage != Stage::Over {
+            return None;
+        }
+        if self.lease.is_none() {
+            let needed = memory::lease_bytes(&self.description, &self.frame);
+            match memory::check(memory::free(), needed, 0, "a lease") {
+                Err(
+                    ProtocolError::SharedMemory { free, needed, .. }
+                    | ProtocolError::Memory { free, needed, .. },
+                ) => {
+                    return Some(Response::NoMemory { free, needed });
+                }
+                Err(error) => {
+                    return Some(Response::Refused {
+                        reason: error.to_string(),
+                    });
+                }
+                Ok(()) => self.renew(),
+            }
+        }
+        Some(match &mut self.lease {
+            None => Response::Refused {
+                reason: "the services of a new lease could not be created".to_owned(),
+            },
+            Some(Lease {
+                holder: Some(holder),
+                ..
+            }) => Response::Held { pid: holder.pid },
+            Some(lease) => {
+                lease.grant(pid);
+                Response::Granted { epoch: lease.epoch }
+            }
+        })
+    }
+}
