@@ -139,99 +139,136 @@ impl<C: Cx> Answer<C> {
     }
 }
 
+/// Evaluations of points of a line, counted as MuJoCo does: `ls_iterations` bounds them, and not iterations.
+struct Evaluations<'a, C: Cx> {
+    m: &'a ConstantsOf<C>,
+    line: &'a Segment<'a, C::F>,
+    counts: (&'a mut C::V, &'a mut C::V),
+    done: C::V,
+}
+
+impl<C: Cx> Evaluations<'_, C> {
+    fn point<const TURNS: bool>(&mut self, cx: &mut C, alpha: C::F) -> Point<C> {
+        let count = cx.get(&self.done) + C::F::c(1.0);
+        cx.set(&mut self.done, count);
+        cx.tally(self.counts.0, self.counts.1);
+        self.line.point::<C, TURNS>(cx, self.m, alpha)
+    }
+
+    fn are_spent(&self, cx: &C) -> MaskOf<C> {
+        let most = C::F::c(self.m.solver.ls_iterations as f64 - 0.5);
+        most.lt(cx.get(&self.done))
+    }
+
+    /// Whether the slope is below the bound, or only rounding is left of it.
+    fn is_close(&self, cx: &C, point: &Point<C>) -> MaskOf<C> {
+        let bound = self.line.bound.max(cx.get(&point.size) * epsilon::<C>());
+        cx.get(&point.slope).abs().lt(bound)
+    }
+}
+
+fn epsilon<C: Cx>() -> C::F {
+    C::F::c(<<C::F as Num>::Real as Real>::EPSILON)
+}
+
 /// Searches the line.
-pub(super) fn search<C: Cx, const TURNS: bool>(
+pub(super) fn search<'a, C: Cx, const TURNS: bool>(
     cx: &mut C,
-    m: &ConstantsOf<C>,
-    line: &Segment<'_, C::F>,
-    counts: (&mut C::V, &mut C::V),
+    m: &'a ConstantsOf<C>,
+    line: &'a Segment<'a, C::F>,
+    counts: (&'a mut C::V, &'a mut C::V),
 ) -> Answer<C> {
-    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
-    let most = C::F::c(m.solver.ls_iterations as f64 - 0.5);
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut answer = Answer {
         alpha: cx.var(zero),
         cost: cx.var(zero),
         ended: cx.var(zero),
     };
-    // counted as MuJoCo does, which bounds evaluations and not iterations
-    let mut evaluations = cx.var(zero);
-    macro_rules! point {
-        ($alpha:expr) => {{
-            let alpha = $alpha;
-            let count = cx.get(&evaluations) + one;
-            cx.set(&mut evaluations, count);
-            cx.tally(counts.0, counts.1);
-            line.point::<C, TURNS>(cx, m, alpha)
-        }};
-    }
-    let start = point!(zero);
+    let mut evaluations = Evaluations {
+        m,
+        line,
+        counts,
+        done: cx.var(zero),
+    };
+    let start = evaluations.point::<TURNS>(cx, zero);
     // or only rounding is left, which no further iteration brings down
-    let epsilon = C::F::c(<<C::F as Num>::Real as Real>::EPSILON);
-    let rounding = cx.get(&start.size) * epsilon * C::F::c(ROUNDINGS);
+    let rounding = cx.get(&start.size) * epsilon::<C>() * C::F::c(ROUNDINGS);
     let arrived = cx.get(&start.slope).abs().lt(rounding);
     answer.take(cx, arrived, &start);
-    let mut first = point!(start.newton(cx));
-    let is_close = |cx: &C, point: &Point<C>| {
-        let bound = line.bound.max(cx.get(&point.size) * epsilon);
-        cx.get(&point.slope).abs().lt(bound)
-    };
-    let close = is_close(cx, &first) & !arrived;
+    let alpha = start.newton(cx);
+    let mut first = evaluations.point::<TURNS>(cx, alpha);
+    let close = evaluations.is_close(cx, &first) & !arrived;
     answer.take(cx, close, &first);
     let ahead = C::F::select(cx.get(&first.slope).lt(zero), one, -one);
     let mut second = first.copy(cx);
     times!(cx, m.solver.ls_iterations, {
         let crossed = (-line.bound).lt(cx.get(&first.slope) * ahead);
-        let spent = most.lt(cx.get(&evaluations));
+        let spent = evaluations.are_spent(cx);
         break_if!(cx, crossed | spent | answer.has_ended(cx));
         let values = first.values(cx);
         second.set(cx, values);
-        let next = point!(first.newton(cx)).values(cx);
+        let alpha = first.newton(cx);
+        let next = evaluations.point::<TURNS>(cx, alpha).values(cx);
         first.set(cx, next);
-        let close = is_close(cx, &first);
+        let close = evaluations.is_close(cx, &first);
         answer.take(cx, close, &first);
     });
-    let spent = most.lt(cx.get(&evaluations));
-    let ends = spent & !answer.has_ended(cx);
+    let ends = evaluations.are_spent(cx) & !answer.has_ended(cx);
     answer.take(cx, ends, &first);
     let goes_on = !answer.has_ended(cx);
     when!(cx, goes_on, {
-        let mut from_second = first.copy(cx);
-        let mut from_first = point!(first.newton(cx));
-        times!(cx, m.solver.ls_iterations, {
-            let spent = most.lt(cx.get(&evaluations));
-            break_if!(cx, spent | answer.has_ended(cx));
-            let middle = point!(half * (cx.get(&first.alpha) + cx.get(&second.alpha)));
-            let mut answered = zero;
-            for candidate in [&from_first, &from_second, &middle] {
-                let costs_less = cx.get(&candidate.cost).lt(cx.get(&answer.cost));
-                let better = costs_less | answered.lt(half);
-                let takes = is_close(cx, candidate) & better;
-                answer.take(cx, takes, candidate);
-                answered = C::F::select(takes, one, answered);
-            }
-            break_if!(cx, half.lt(answered));
-            let before = from_first.copy(cx);
-            let candidates = [&before, &from_second, &middle];
-            let first_moved = first.advance(cx, candidates);
-            when!(cx, first_moved, {
-                let next = point!(first.newton(cx)).values(cx);
-                from_first.set(cx, next);
-            });
-            let second_moved = second.advance(cx, candidates);
-            when!(cx, second_moved, {
-                let next = point!(second.newton(cx)).values(cx);
-                from_second.set(cx, next);
-            });
-            answer.take(cx, !first_moved & !second_moved, &middle);
-        });
-        // evaluations are spent: the end that costs less, if it costs less than the start
-        let open = !answer.has_ended(cx);
-        let (cost, other) = (cx.get(&first.cost), cx.get(&second.cost));
-        let is_first = !other.lt(cost);
-        answer.take(cx, open & is_first & cost.lt(zero), &first);
-        answer.take(cx, open & !is_first & other.lt(zero), &second);
+        shrink::<C, TURNS>(cx, &mut evaluations, &mut answer, [first, second]);
     });
     answer
+}
+
+/// Shrinks a bracket until one of its points is the answer.
+fn shrink<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    evaluations: &mut Evaluations<'_, C>,
+    answer: &mut Answer<C>,
+    [mut first, mut second]: [Point<C>; 2],
+) {
+    let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+    let mut from_second = first.copy(cx);
+    let alpha = first.newton(cx);
+    let mut from_first = evaluations.point::<TURNS>(cx, alpha);
+    times!(cx, evaluations.m.solver.ls_iterations, {
+        let spent = evaluations.are_spent(cx);
+        break_if!(cx, spent | answer.has_ended(cx));
+        let alpha = half * (cx.get(&first.alpha) + cx.get(&second.alpha));
+        let middle = evaluations.point::<TURNS>(cx, alpha);
+        let mut answered = zero;
+        for candidate in [&from_first, &from_second, &middle] {
+            let costs_less = cx.get(&candidate.cost).lt(cx.get(&answer.cost));
+            let better = costs_less | answered.lt(half);
+            let takes = evaluations.is_close(cx, candidate) & better;
+            answer.take(cx, takes, candidate);
+            answered = C::F::select(takes, one, answered);
+        }
+        break_if!(cx, half.lt(answered));
+        let before = from_first.copy(cx);
+        let candidates = [&before, &from_second, &middle];
+        let first_moved = first.advance(cx, candidates);
+        when!(cx, first_moved, {
+            let alpha = first.newton(cx);
+            let next = evaluations.point::<TURNS>(cx, alpha).values(cx);
+            from_first.set(cx, next);
+        });
+        let second_moved = second.advance(cx, candidates);
+        when!(cx, second_moved, {
+            let alpha = second.newton(cx);
+            let next = evaluations.point::<TURNS>(cx, alpha).values(cx);
+            from_second.set(cx, next);
+        });
+        answer.take(cx, !first_moved & !second_moved, &middle);
+    });
+    // evaluations are spent: the end that costs less, if it costs less than the start
+    let open = !answer.has_ended(cx);
+    let (cost, other) = (cx.get(&first.cost), cx.get(&second.cost));
+    let is_first = !other.lt(cost);
+    answer.take(cx, open & is_first & cost.lt(zero), &first);
+    answer.take(cx, open & !is_first & other.lt(zero), &second);
 }
 
 impl<F: Num> Segment<'_, F> {
