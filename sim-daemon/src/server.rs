@@ -109,7 +109,7 @@ fn serve(
             Next::DeviceMemory => {
                 host.deliver(|host| device_memory::share(simulation, host.frame_slots()));
             }
-            // told above
+            // handled above
             Next::LeaseEnded => {}
             Next::Record => record_state(simulation, host, false),
             Next::End => return Ok(()),

@@ -23,21 +23,21 @@ enum Stage {
     /// No pages of another lease are owned.
     #[default]
     Over,
-    /// The owner has not been told.
+    /// The owner does not know yet that the lease has ended.
     Owned,
-    /// The owner has been told.
-    Told,
+    /// The owner was notified of it.
+    Notified,
 }
 
 impl Handover {
-    /// Whether the owner of the pages must be told that their lease has ended.
+    /// Whether the owner of the pages must be notified that their lease has ended.
     pub(super) fn is_due(&self) -> bool {
         self.stage == Stage::Owned
     }
 
-    /// The owner of the pages is told, and lets go of them before it waits again.
-    pub(super) fn tell(&mut self) {
-        self.stage = Stage::Told;
+    /// Notes that the owner of the pages is notified: it lets go of them before it waits again.
+    pub(super) fn notify(&mut self) {
+        self.stage = Stage::Notified;
     }
 
     /// Keeps a request for a lease until there is room for one.
@@ -71,7 +71,7 @@ impl State {
 
     /// Makes a lease ready that had to wait for the owner of pages of the last.
     pub(super) fn hand_over(&mut self) {
-        if self.handover.stage == Stage::Told {
+        if self.handover.stage == Stage::Notified {
             self.handover.stage = Stage::Over;
             self.open_lease();
         }

@@ -168,7 +168,7 @@ impl Host {
             if let Some(next) = guarded(|| self.look()) {
                 self.panics = 0;
                 if let Ok(Next::LeaseEnded) = next {
-                    self.state.handover.tell();
+                    self.state.handover.notify();
                 }
                 return next;
             }
