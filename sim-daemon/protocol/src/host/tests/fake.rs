@@ -147,7 +147,7 @@ fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: D
             Next::Late => unreachable!("it keeps no pace"),
             Next::LeaseEnded => {
                 // nobody else has them, and there is no other lease before they go
-                assert_eq!(owned.drain(..).map(Arc::into_inner).flatten().count(), 1);
+                assert_eq!(owned.drain(..).filter_map(Arc::into_inner).count(), 1);
                 assert_eq!(host.lease(), 0);
             }
             Next::Record => host.record_state(&[count as u8; STATE], false),
