@@ -136,9 +136,9 @@ def test_constants_and_wrong_values_are_refused_by_name(pendulum):
         with pytest.raises(
             tl.CommandRefused, match=r"params\.joint_target_ke is .*one value for each of sim\.dof_names"
         ):
-            sim.params.joint_target_ke = {"arm/hinge": 1.0}
+            sim.params.joint_target_ke = {"arm/hinge": 1.0}  # pyright: ignore[reportArgumentType]
         with pytest.raises(tl.CommandRefused, match=r"params\.body_mass_scale is .*for each of sim\.body_names"):
-            sim.params.body_mass_scale = {"arm/rod": 1.0}
+            sim.params.body_mass_scale = {"arm/rod": 1.0}  # pyright: ignore[reportArgumentType]
         for bad, reason in ((-1.0, "give at least 0"), (np.nan, "NaN"), (np.inf, "inf")):
             with pytest.raises(tl.CommandRefused, match=reason):
                 sim.params.write(joint_target_ke=[1.0, bad], body_mass_scale=2.0)

@@ -214,12 +214,12 @@ def test_wrong_kinds_are_named(kinds: Any) -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: tl.terrain.stairs(step_height=0.1), "stairs: there is no argument `step_height`"),
+        (lambda: tl.terrain.stairs(step_height=0.1), "stairs: there is no argument `step_height`"),  # pyright: ignore[reportCallIssue]
         (lambda: tl.terrain.mixed(hardest={"stair": 0.3}), "hardest has 'stair', .*did you mean `stairs`"),
         (lambda: tl.terrain.mixed(hardest={"steps": float("nan")}), "hardest steps is nan"),
         (lambda: tl.terrain.mixed(hardest={"steps": -1.0}), "hardest steps is -1"),
-        (lambda: tl.terrain.mixed(hardest=0.3), r"hardest is 0\.3; give a dict"),
-        (lambda: tl.terrain.rough(seed=1.5), r"seed is 1\.5; give a whole number"),
+        (lambda: tl.terrain.mixed(hardest=0.3), r"hardest is 0\.3; give a dict"),  # pyright: ignore[reportArgumentType]
+        (lambda: tl.terrain.rough(seed=1.5), r"seed is 1\.5; give a whole number"),  # pyright: ignore[reportArgumentType]
         (lambda: tl.terrain.mixed(levels=10**6), "elevations are more than .* fewer levels"),
         (lambda: tl.terrain.mixed(border=1e5), "elevations are more than"),
         (lambda: tl.terrain.rough(cell=1e-9), "give a larger cell"),
