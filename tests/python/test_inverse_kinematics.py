@@ -357,7 +357,7 @@ solver.solve(np.full((300_000, 3), 9.0), (1, 0, 0, 0), iterations=1000, restarts
 COMPILING = """
 cube = ("[[body]]\\nname = 'cube%d'\\npos = [%d, 0, 1]\\nmass = 1.0\\n"
         "[[shape]]\\nname = 'box%d'\\ntype = 'box'\\nhalf_extents = [0.1, 0.1, 0.1]\\nbody = 'cube%d'\\n")
-text = "dt = 0.002\\nsubsteps = 1\\n" + "".join(cube % (i, i, i, i) for i in range(50_000))
+text = "dt = 0.002\\nsubsteps = 1\\n" + "".join(cube % (i, i, i, i) for i in range(340))
 print("ready", flush=True)
 tl._core.Ik(text, "/")
 """

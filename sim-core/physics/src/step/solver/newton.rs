@@ -75,11 +75,14 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
         let count = cx.get(&iteration) + one;
         cx.set(&mut iteration, count);
     });
-    let mut unconverged = cx.get(&b.unconverged[0]);
-    for busy in &b.busy {
-        unconverged = unconverged.max(cx.get(busy));
+    // at a tolerance of 0 MuJoCo iterates to the end, wherever it is: that tells nothing
+    if problem.search.tolerance.to_f64() > 0.0 {
+        let mut unconverged = cx.get(&b.unconverged[0]);
+        for busy in &b.busy {
+            unconverged = unconverged.max(cx.get(busy));
+        }
+        cx.set(&mut b.unconverged[0], unconverged);
     }
-    cx.set(&mut b.unconverged[0], unconverged);
 }
 
 /// Moves an island along its step, and ends it where that has arrived.
