@@ -58,11 +58,14 @@ print("ready", flush=True)
 Daemon.start(text, {"name": name, "worlds": 1, "device": "cpu"})
 """,
     ),
-    "compiling for a GPU": (8, "print('ready', flush=True); launch(device='gpu', worlds=256); time.sleep(60)"),
+    "compiling for a GPU": (
+        8,
+        "print('ready', flush=True); launch(device='gpu', worlds=256); import time; time.sleep(60)",
+    ),
     "choosing a device": (
         8,
         "os.environ['TIGHTLOOP_AUTO_SOFTWARE'] = '1'; print('ready', flush=True); "
-        "launch(device='auto', worlds=256, threads=None); time.sleep(60)",
+        "launch(device='auto', worlds=256, threads=None); import time; time.sleep(60)",
     ),
     "snapshots and restores": (
         1,

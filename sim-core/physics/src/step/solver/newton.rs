@@ -15,7 +15,7 @@ use super::islands::{find, force_norm, is_island, norm, trace};
 use super::rows::{Acting, Jacobian, residual};
 use super::{constraint_forces, minimize_model, model_cost};
 use crate::constants::mujoco::Search;
-use crate::lane::{Cx, MaskOf, Num};
+use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::multiply;
 use crate::step::{BlockOf, ConstantsOf};
 use crate::{break_if, times, when};
