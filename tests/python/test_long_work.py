@@ -60,12 +60,12 @@ Daemon.start(text, {"name": name, "worlds": 1, "device": "cpu"})
     ),
     "compiling for a GPU": (
         8,
-        "print('ready', flush=True); launch(device='gpu', worlds=256); import time; time.sleep(60)",
+        "print('ready', flush=True); sim = launch(device='gpu', worlds=256); import time; time.sleep(60)",
     ),
     "choosing a device": (
         8,
         "os.environ['TIGHTLOOP_AUTO_SOFTWARE'] = '1'; print('ready', flush=True); "
-        "launch(device='auto', worlds=256, threads=None); import time; time.sleep(60)",
+        "sim = launch(device='auto', worlds=256, threads=None); import time; time.sleep(60)",
     ),
     "snapshots and restores": (
         1,
