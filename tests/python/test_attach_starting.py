@@ -56,7 +56,7 @@ def test_a_start_that_begins_late_gets_no_further_timeout(root, unique):
     finally:
         thread.join()
         for daemon in daemons:
-            daemon.kill()
+            daemon.terminate()
             daemon.wait(20.0)
 
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Pages of the host that stay mapped as long as somebody owns this.
+/// Pages of the host that stay mapped until the last owner is gone.
 ///
 /// # Safety
 /// `start` and `bytes` never change, and all that lies between is mapped, readable and writable, until the value is dropped.
@@ -41,7 +41,7 @@ impl Device {
     /// Errors: `DeviceError::Import` if the range is not inside, or the driver refuses; nothing has changed then.
     ///
     /// # Safety
-    /// While a batch that writes the buffer runs, nobody relies on what it writes over.
+    /// While a batch that writes the buffer runs, no other code relies on what it overwrites.
     pub unsafe fn import(
         &self,
         pages: Arc<dyn HostPages>,

@@ -304,7 +304,7 @@ pub(super) fn pairs(
     filtered: &BTreeSet<[usize; 2]>,
 ) -> Result<Vec<(usize, usize)>, ModelError> {
     let mut pairs = Vec::new();
-    let mut found = 0;
+    let mut count = 0_usize;
     for (j, second) in pieces.iter().enumerate() {
         for (i, first) in pieces[..j].iter().enumerate() {
             let (a, b) = (&shapes[first.shape], &shapes[second.shape]);
@@ -312,9 +312,9 @@ pub(super) fn pairs(
             if filtered.contains(&numbers) || !may_touch(a, b, rules) {
                 continue;
             }
-            found += 1;
+            count += 1;
             // the message says how many there are, and memory holds no more than can be used
-            if found > PAIRS_MAX {
+            if count > PAIRS_MAX {
                 continue;
             }
             pairs.push(match first.solid.kind <= second.solid.kind {
@@ -327,7 +327,7 @@ pub(super) fn pairs(
                 terrain one height field";
     within(
         "the number of pairs of shapes that may touch",
-        found as f64,
+        count as f64,
         PAIRS_MAX as f64,
         rule,
     )?;

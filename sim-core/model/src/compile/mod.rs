@@ -161,6 +161,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             islands: models().all(|parts| parts.islands),
             warm_start: models().all(|parts| parts.warm_start),
             roots: roots(&constants.bodies),
+            classes: Vec::new(),
         });
         constants.damped = is_damped(&constants, scene, parts.implicit_damping);
     }
@@ -173,6 +174,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         mujoco: scene.robots.iter().map(|r| r.mujoco.as_deref()).collect(),
     };
     add_contacts(&mut constants, scene, &placed, &rules)?;
+    if let Some(search) = &mut constants.mujoco.search {
+        search.classes = classes_of_roots(&search.roots, &constants.contacts);
+    }
     constants.scans = scene.placed_scans(&builder.carriers, &constants.contacts)?;
     mujoco_contacts::add_contact_sensors(&mut constants, scene, &placed);
     let surfaces: Vec<f64> = placed.iter().map(|shape| shape.surface.mu).collect();
@@ -278,6 +282,17 @@ fn roots(bodies: &[Body<f64>]) -> Vec<usize> {
         of_dofs.extend(std::iter::repeat_n(root.unwrap_or(body.dof), dofs));
     }
     of_dofs
+}
+
+/// Of each dof, the classes of contacts whose first dof is of the tree that begins there.
+fn classes_of_roots(roots: &[usize], contacts: &Contacts<f64>) -> Vec<Vec<usize>> {
+    let mut classes = vec![Vec::new(); roots.len()];
+    for (k, class) in contacts.classes.iter().enumerate() {
+        if let Some(column) = class.columns.first() {
+            classes[roots[column.dof]].push(k);
+        }
+    }
+    classes
 }
 
 /// Refuses models from MuJoCo that do not fit together, or that a parameter would change in silence.

@@ -37,9 +37,9 @@ pub(super) enum Found {
 /// A path that leads to no file is tried as Windows and addresses of the web write it: with backslashes, and with `%20` for
 /// a blank.
 pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {
-    let found = resolve_as_written(uri, folder, package_dirs);
-    if !matches!(found, Found::Missing(_)) {
-        return found;
+    let written = resolve_as_written(uri, folder, package_dirs);
+    if !matches!(written, Found::Missing(_)) {
+        return written;
     }
     let slashes = uri.trim().replace('\\', "/");
     let decoded = percent_decoded(&slashes);
@@ -49,7 +49,7 @@ pub(super) fn resolve(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Fou
         .map(|other| resolve_as_written(&other, folder, package_dirs));
     others
         .find(|other| matches!(other, Found::File(_) | Found::Renamed { .. }))
-        .unwrap_or(found)
+        .unwrap_or(written)
 }
 
 fn resolve_as_written(uri: &str, folder: &Path, package_dirs: &[PathBuf]) -> Found {

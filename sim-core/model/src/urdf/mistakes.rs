@@ -7,7 +7,7 @@ const LISTED_MAX: usize = 8;
 /// Jaro-Winkler similarity of a misspelt name: `orgin`, `dampening` and `multiplicator` have 0.92 or more. What simulators
 /// add to URDF has less, or is URDF's name with a word behind it, as `damping_ratio`.
 const SIMILAR: f64 = 0.9;
-/// An angle above a turn is written by nobody who counts radians [rad]; 6.2832 is a turn, rounded.
+/// An angle above a turn is hardly in radians [rad]; 6.2832 is a turn, rounded.
 const ANGLE_USUAL: f64 = TAU + 0.01;
 /// Names that other formats have for the same: element, name, and URDF's.
 const SYNONYMS: [(&str, &str, &str); 9] = [

@@ -7,6 +7,7 @@ use super::recast::{Recast, recast, same};
 use super::sensors::Sensors;
 use super::ties::Tie;
 use crate::lane::Fixed;
+use std::ops::Range;
 
 /// How a step integrates velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -123,6 +124,8 @@ recast! {
         pub warm_start: bool,
         /// Of each dof, the first one of its kinematic tree.
         pub roots: Vec<usize>,
+        /// Of each such first dof, the classes of contacts that its tree is the first of; empty for other dofs.
+        pub classes: Vec<Vec<usize>>,
     }
 }
 
@@ -130,6 +133,16 @@ impl<R> Search<R> {
     /// The first dofs of trees, after which islands are named.
     pub fn islands_of(&self, dofs: usize) -> impl Iterator<Item = usize> + '_ {
         (0..dofs).filter(|&dof| self.roots[dof] == dof)
+    }
+
+    /// Runs of dofs that are of one tree.
+    pub fn segments(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let mut end = 0;
+        self.roots.chunk_by(|a, b| a == b).map(move |run| {
+            let start = end;
+            end += run.len();
+            start..end
+        })
     }
 }
 

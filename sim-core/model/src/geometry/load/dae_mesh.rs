@@ -123,9 +123,9 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             let list = list.child("p").unwrap_or(list);
             let indices = numbers::<u32>(Some(list))?;
             if !indices.len().is_multiple_of(stride) {
-                let found = indices.len();
+                let given = indices.len();
                 return Err(format!(
-                    "a <p> has {found} indices, {stride} a corner; it was cut short, export it again"
+                    "a <p> has {given} indices, {stride} a corner; it was cut short, export it again"
                 ));
             }
             let corners: Vec<u32> = indices

@@ -17,7 +17,7 @@ use crate::{break_if, times, when};
 const ROUNDINGS: f64 = 8.0;
 
 /// A line through the cost: accelerations `start` + α `step`, residuals `jar` + α `jar_minimum`.
-pub(super) struct Segment<'a, F> {
+pub(super) struct Segment<'a, F: Num> {
     pub params: &'a [F],
     pub w: &'a Workspace<F>,
     pub acting: Acting,
@@ -287,30 +287,41 @@ impl<F: Num> Segment<'_, F> {
             curvature,
             size: slope.abs() + (alpha * curvature).abs(),
         };
-        let (jar, jv, weight) = (&self.w.jar, &self.w.jar_minimum, &self.w.row_weight);
-        let there = |r: usize| alpha.fma(jv[r], jar[r]);
+        let (jar, weight) = (&self.w.jar, &self.w.row_weight);
+        // rows of other islands stay where they are
+        let change = |r: usize, dof: usize| {
+            let jv = F::select(self.own.has(dof), self.w.jar_minimum[r], F::c(0.0));
+            (jv, alpha.fma(jv, jar[r]))
+        };
         let mut r = 0;
-        for _ in &m.equalities {
-            let costs = [jar[r], there(r)].map(|jar| half * weight[r] * jar * jar);
-            sums.add(&equality(there(r), weight[r]), jv[r], costs);
+        for e in &m.equalities {
+            let (jv, there) = change(r, e.follower);
+            let costs = [jar[r], there].map(|jar| half * weight[r] * jar * jar);
+            sums.add(&equality(there, weight[r]), jv, costs);
             r += 1;
         }
         for friction in &m.frictions {
+            let (jv, there) = change(r, friction.dof);
             let [zone, loss] = bounds(m, self.params, friction);
-            let costs = [jar[r], there(r)].map(|jar| dry_cost(jar, weight[r], zone, loss));
-            let law = dry_friction(there(r), weight[r], zone, loss);
-            sums.add(&law, jv[r], costs);
+            let costs = [jar[r], there].map(|jar| dry_cost(jar, weight[r], zone, loss));
+            let law = dry_friction(there, weight[r], zone, loss);
+            sums.add(&law, jv, costs);
             r += 1;
         }
-        for r in self.acting.runs().flatten().map(|limit| r + limit) {
-            let costs =
-                [jar[r], there(r)].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
-            sums.add(&one_sided(there(r), weight[r]), jv[r], costs);
+        for limit in self.acting.runs().flatten() {
+            let r = r + limit;
+            let (jv, there) = change(r, m.limits[limit].dof);
+            let costs = [jar[r], there].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
+            sums.add(&one_sided(there, weight[r]), jv, costs);
         }
         for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-            let law = &m.mujoco.ties[*tie].law;
-            let costs = [jar[r], there(r)].map(|jar| ties::cost(law, jar, weight[r]));
-            sums.add(&ties::law(law, there(r), weight[r]), jv[r], costs);
+            let tie = &m.mujoco.ties[*tie];
+            let Some(&dof) = tie.dofs.first() else {
+                continue;
+            };
+            let (jv, there) = change(r, dof);
+            let costs = [jar[r], there].map(|jar| ties::cost(&tie.law, jar, weight[r]));
+            sums.add(&ties::law(&tie.law, there, weight[r]), jv, costs);
         }
         let all = [sums.cost, sums.slope, sums.curvature, sums.size];
         let mut cells = all.map(|sum| cx.var(sum));

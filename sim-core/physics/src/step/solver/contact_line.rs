@@ -1,64 +1,53 @@
 //! Contacts of an island along a line of MuJoCo's search: cost, slope and curvature at a point of it.
 //!
-//! The line moves one island, so contacts of others are left alone: a pile of islands costs no more than one of their size.
+//! The line moves one island, and only its trees' contacts are visited.
 
 use super::cones::{bend_along, power};
 use super::contacts::{ContactsOf, block_of, law_at};
 use super::islands::is_island;
 use super::turning;
-use crate::constants::contact::Class;
 use crate::constants::contact::{row, turning as more};
-use crate::lane::{Cx, MaskOf, Num};
+use crate::constants::mujoco::Search;
+use crate::lane::{Cx, Num};
 use crate::step::contact_rows::class_list;
 use crate::{each, when};
 
 /// An island, by the island of each dof.
 #[derive(Clone, Copy)]
-pub(super) struct Own<'a, F> {
+pub(super) struct Own<'a, F: Num> {
+    pub search: &'a Search<F::Real>,
     pub islands: &'a [F],
     pub island: F,
 }
 
 impl<F: Num> Own<'_, F> {
-    /// The worlds in which a class of contacts is part of the island.
+    /// The worlds in which a dof is of the island.
     #[inline(always)]
-    fn has<C: Cx<F = F>>(&self, class: &Class<F::Real>) -> Option<MaskOf<C>> {
-        // contacts make one island of all dofs that move them
-        let dof = class.columns.first()?.dof;
-        Some(is_island(self.islands[dof], self.island))
+    pub fn has(&self, dof: usize) -> F::Mask {
+        is_island(self.islands[dof], self.island)
     }
 }
 
-/// Writes J `step` to `AHEAD` of the island's contacts.
+/// Writes J `step` to `AHEAD` of all contacts.
 #[inline(always)]
-pub(super) fn changes<C: Cx, const TURNS: bool>(
-    cx: &mut C,
-    t: &ContactsOf<C>,
-    own: Own<'_, C::F>,
-    step: &[C::F],
-) {
+pub(super) fn changes<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, step: &[C::F]) {
     let zero = [C::F::c(0.0); 3];
     for (k, class) in t.classes.iter().enumerate() {
-        let Some(has) = own.has::<C>(class) else {
-            continue;
-        };
-        when!(cx, has, {
-            let list = class_list(cx, t, k);
-            each!(cx, r in list, {
-                let (mut moves, mut turns) = (zero, zero);
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let (mut moves, mut turns) = (zero, zero);
+            for run in &class.runs {
+                let first = row::JACOBIAN + 3 * run.column;
+                moves = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], moves);
+            }
+            cx.fill_all(t.memory.rows, r, row::AHEAD, moves);
+            if let Some(block) = block_of::<_, TURNS>(class) {
                 for run in &class.runs {
-                    let first = row::JACOBIAN + 3 * run.column;
-                    moves = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], moves);
+                    let first = block + more::JACOBIAN + 3 * run.column;
+                    turns = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], turns);
                 }
-                cx.fill_all(t.memory.rows, r, row::AHEAD, moves);
-                if let Some(block) = block_of::<_, TURNS>(class) {
-                    for run in &class.runs {
-                        let first = block + more::JACOBIAN + 3 * run.column;
-                        turns = cx.sum_triples(t.memory.rows, r, first, &step[run.places()], turns);
-                    }
-                    cx.fill_all(t.memory.rows, r, block + more::AHEAD, turns);
-                }
-            });
+                cx.fill_all(t.memory.rows, r, block + more::AHEAD, turns);
+            }
         });
     }
 }
@@ -73,46 +62,48 @@ pub(super) fn add<C: Cx, const TURNS: bool>(
     alpha: C::F,
     sums: &mut [C::V; 4],
 ) {
-    for (k, class) in t.classes.iter().enumerate() {
-        let Some(has) = own.has::<C>(class) else {
-            continue;
-        };
-        when!(cx, has, {
-            let list = class_list(cx, t, k);
-            each!(cx, r in list, {
-                let terms = match block_of::<_, TURNS>(class) {
-                    None => {
-                        let jar = cx.load3(t.memory.rows, r, row::JAR);
-                        let jv = cx.load3(t.memory.rows, r, row::AHEAD);
-                        let mut there = jar;
-                        for i in 0..3 {
-                            there[i] = alpha.fma(jv[i], jar[i]);
+    // contacts make one island of all dofs that move them, so the first one tells
+    for root in own.search.islands_of(own.islands.len()) {
+        let here = own.has(root);
+        when!(cx, here, {
+            for &k in &own.search.classes[root] {
+                let class = &t.classes[k];
+                let list = class_list(cx, t, k);
+                each!(cx, r in list, {
+                    let terms = match block_of::<_, TURNS>(class) {
+                        None => {
+                            let jar = cx.load3(t.memory.rows, r, row::JAR);
+                            let jv = cx.load3(t.memory.rows, r, row::AHEAD);
+                            let mut there = jar;
+                            for i in 0..3 {
+                                there[i] = alpha.fma(jv[i], jar[i]);
+                            }
+                            let start = law_at(cx, t, r, jar);
+                            let law = law_at(cx, t, r, there);
+                            let power = power(&law.force, jv);
+                            let bend = bend_along(&law, jv);
+                            [law.cost - start.cost, -power, bend, power.abs()]
                         }
-                        let start = law_at(cx, t, r, jar);
-                        let law = law_at(cx, t, r, there);
-                        let power = power(&law.force, jv);
-                        let bend = bend_along(&law, jv);
-                        [law.cost - start.cost, -power, bend, power.abs()]
-                    }
-                    Some(block) => {
-                        let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
-                        let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
-                        let mut there = jar;
-                        for i in 0..6 {
-                            there[i] = alpha.fma(jv[i], jar[i]);
+                        Some(block) => {
+                            let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
+                            let jv = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
+                            let mut there = jar;
+                            for i in 0..6 {
+                                there[i] = alpha.fma(jv[i], jar[i]);
+                            }
+                            let start = turning::law_at(cx, t, r, block, jar, None);
+                            let law = turning::law_at(cx, t, r, block, there, None);
+                            let bend = turning::dot(law.times(jv), jv);
+                            let power = turning::dot(law.force, jv);
+                            [law.cost - start.cost, -power, bend, power.abs()]
                         }
-                        let start = turning::law_at(cx, t, r, block, jar, None);
-                        let law = turning::law_at(cx, t, r, block, there, None);
-                        let bend = turning::dot(law.times(jv), jv);
-                        let power = turning::dot(law.force, jv);
-                        [law.cost - start.cost, -power, bend, power.abs()]
+                    };
+                    for (sum, term) in sums.iter_mut().zip(terms) {
+                        let total = cx.get(sum) + cx.only(term);
+                        cx.put(sum, total);
                     }
-                };
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    let total = cx.get(sum) + cx.only(term);
-                    cx.put(sum, total);
-                }
-            });
+                });
+            }
         });
     }
 }

@@ -5,6 +5,7 @@
 //! by experiment with MuJoCo 3.17).
 
 use super::super::mujoco_state::{free_bodies, halves};
+use super::contact_line::Own;
 use super::contacts;
 use super::rows::Acting;
 use crate::arrays::Workspace;
@@ -117,19 +118,33 @@ pub(super) fn is_island<F: Num>(island: F, other: F) -> F::Mask {
 
 /// The trace of the mass matrix over the dofs of an island, in MuJoCo's velocities.
 #[inline(always)]
-pub(super) fn trace<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, island: F) -> F {
-    let zero = F::c(0.0);
+pub(super) fn trace<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    w: &Workspace<C::F>,
+    own: &Own<'_, C::F>,
+) -> C::F {
+    let zero = C::F::c(0.0);
     let mut sum = zero;
-    for j in 0..m.dofs.len() {
-        let diagonal = w.mass_matrix[m.pattern.at(j, j)];
-        sum = sum + F::select(is_island(w.island[j], island), diagonal, zero);
+    for segment in own.search.segments() {
+        let here = own.has(segment.start);
+        if cx.anywhere(here) {
+            for j in segment {
+                let diagonal = w.mass_matrix[m.pattern.at(j, j)];
+                sum = sum + C::F::select(here, diagonal, zero);
+            }
+        }
     }
     for (k, dof) in free_bodies(m) {
+        let here = own.has(dof);
+        if !cx.anywhere(here) {
+            continue;
+        }
         // an angular velocity e about the frame's origin moves the centre of mass by e × r, with r = -origin
         let mut more = zero;
         for i in 0..3 {
             let mut axis = [zero; 3];
-            axis[i] = F::c(1.0);
+            axis[i] = C::F::c(1.0);
             let shift = w.origin[k].cross(Vec3(axis));
             for row in 0..3 {
                 let cross = entry(m, w, dof + 3 + i, dof + row);
@@ -141,7 +156,7 @@ pub(super) fn trace<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, island: F)
                 }
             }
         }
-        sum = sum + F::select(is_island(w.island[dof], island), more, zero);
+        sum = sum + C::F::select(here, more, zero);
     }
     sum
 }
@@ -155,40 +170,62 @@ fn entry<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, row: usize, column: u
     }
 }
 
-/// The norm of an acceleration in MuJoCo's velocities, where it differs from 0 on one island.
+/// The norm of an acceleration of an island in MuJoCo's velocities.
 #[inline(always)]
-pub(super) fn norm<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, step: &[F]) -> F {
-    let mut sum = F::c(0.0);
-    for x in step {
-        sum = x.fma(*x, sum);
-    }
+pub(super) fn norm<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    w: &Workspace<C::F>,
+    own: &Own<'_, C::F>,
+    step: &[C::F],
+) -> C::F {
+    let mut sum = dot(cx, own, step, step);
     for (k, dof) in free_bodies(m) {
-        let [linear, angular] = halves(&step[dof..]);
-        let moved = angular.cross_add(w.origin[k], linear);
-        sum = sum + (moved.dot(moved) - linear.dot(linear));
+        let here = own.has(dof);
+        if cx.anywhere(here) {
+            let [linear, angular] = halves(&step[dof..]);
+            let moved = angular.cross_add(w.origin[k], linear);
+            let more = moved.dot(moved) - linear.dot(linear);
+            sum = sum + C::F::select(here, more, C::F::c(0.0));
+        }
     }
     sum.sqrt()
 }
 
 /// The norm of a force of dofs over an island, in MuJoCo's velocities.
 #[inline(always)]
-pub(super) fn force_norm<F: Num>(
-    m: &Constants<F::Real>,
-    w: &Workspace<F>,
-    force: &[F],
-    island: F,
-) -> F {
-    let zero = F::c(0.0);
-    let mut sum = zero;
-    for (force, of_dof) in force.iter().zip(&w.island) {
-        let force = F::select(is_island(*of_dof, island), *force, zero);
-        sum = force.fma(force, sum);
-    }
+pub(super) fn force_norm<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    w: &Workspace<C::F>,
+    own: &Own<'_, C::F>,
+    force: &[C::F],
+) -> C::F {
+    let mut sum = dot(cx, own, force, force);
     for (k, dof) in free_bodies(m) {
-        let [force, torque] = halves(&force[dof..]);
-        let moved = torque - w.origin[k].cross(force);
-        let more = moved.dot(moved) - torque.dot(torque);
-        sum = sum + F::select(is_island(w.island[dof], island), more, zero);
+        let here = own.has(dof);
+        if cx.anywhere(here) {
+            let [force, torque] = halves(&force[dof..]);
+            let moved = torque - w.origin[k].cross(force);
+            let more = moved.dot(moved) - torque.dot(torque);
+            sum = sum + C::F::select(here, more, C::F::c(0.0));
+        }
     }
     sum.sqrt()
+}
+
+/// Σ x y over the dofs of an island.
+#[inline(always)]
+pub(super) fn dot<C: Cx>(cx: &mut C, own: &Own<'_, C::F>, first: &[C::F], second: &[C::F]) -> C::F {
+    let mut sum = C::F::c(0.0);
+    for segment in own.search.segments() {
+        let here = own.has(segment.start);
+        if cx.anywhere(here) {
+            for j in segment {
+                let x = C::F::select(here, first[j], C::F::c(0.0));
+                sum = x.fma(second[j], sum);
+            }
+        }
+    }
+    sum
 }

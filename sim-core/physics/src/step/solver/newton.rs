@@ -11,7 +11,7 @@
 
 use super::bracket::{Segment, search};
 use super::contact_line::{self, Own};
-use super::islands::{find, force_norm, is_island, norm, trace};
+use super::islands::{dot, find, force_norm, is_island, norm, trace};
 use super::rows::{Acting, Jacobian, residual};
 use super::{constraint_forces, minimize_model, model_cost};
 use crate::constants::mujoco::Search;
@@ -61,7 +61,14 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
         for j in 0..dofs {
             w.gauss_gradient[j] = w.gauss_gradient[j] - w.smooth_force[j];
             w.missing[j] = w.gauss_gradient[j] - cx.get(&b.constraint_force[j]);
+            w.step[j] = w.minimum[j] - w.start[j];
         }
+        // along the steps of all islands: none is coupled to another one
+        multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force);
+        w.row_force.fill(zero);
+        let jacobian = Jacobian::new(problem.acting, &w.limit_side, &w.row_jacobian);
+        residual(m, jacobian, &w.row_force, &w.step, &mut w.jar_minimum);
+        contact_line::changes::<_, TURNS>(cx, &m.contacts, &w.step);
         let later = C::F::c(0.5).lt(cx.get(&iteration));
         let mut busy = zero;
         for first in problem.search.islands_of(dofs) {
@@ -96,17 +103,16 @@ fn step<C: Cx, const TURNS: bool>(
 ) {
     let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
     let tolerance = C::F::k(problem.search.tolerance);
-    let w = &mut b.work;
-    let island = C::F::c(first as f64);
-    let mut descent = zero;
-    for j in 0..m.dofs.len() {
-        let moves = is_island(w.island[j], island);
-        w.step[j] = C::F::select(moves, w.minimum[j] - w.start[j], zero);
-        descent = w.missing[j].fnma(w.step[j], descent);
-    }
-    let trace = trace(m, w, island);
-    let gradient = force_norm(m, w, &w.missing, island);
-    let length = norm(m, w, &w.step);
+    let w = &b.work;
+    let own = Own {
+        search: problem.search,
+        islands: &w.island,
+        island: C::F::c(first as f64),
+    };
+    let descent = -dot(cx, &own, &w.step, &w.missing);
+    let trace = trace(cx, m, w, &own);
+    let gradient = force_norm(cx, m, w, &own, &w.missing);
+    let length = norm(cx, m, w, &own, &w.step);
     let small = (half * descent).div(trace).lt(tolerance);
     let flat = gradient.div(trace).lt(tolerance);
     let near = (small & flat) | (later & (small | flat));
@@ -115,20 +121,7 @@ fn step<C: Cx, const TURNS: bool>(
     let mut ends = cx.var(C::F::c(1.0));
     when!(cx, goes_on, {
         cx.tally(&mut b.solver_work[1], &mut b.solver_block_work[1]);
-        multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force);
-        let mut gauss = [zero; 2];
-        for j in 0..m.dofs.len() {
-            gauss[0] = w.step[j].fma(w.gauss_gradient[j], gauss[0]);
-            gauss[1] = w.step[j].fma(w.joint_force[j], gauss[1]);
-        }
-        w.row_force.fill(zero);
-        let jacobian = Jacobian::new(problem.acting, &w.limit_side, &w.row_jacobian);
-        residual(m, jacobian, &w.row_force, &w.step, &mut w.jar_minimum);
-        let own = Own {
-            islands: &w.island,
-            island,
-        };
-        contact_line::changes::<_, TURNS>(cx, &m.contacts, own, &w.step);
+        let gauss = [&w.gauss_gradient, &w.joint_force].map(|terms| dot(cx, &own, &w.step, terms));
         let bound = tolerance * C::F::k(problem.search.ls_tolerance) * length * trace;
         let line = Segment {
             params: &b.params,
@@ -141,9 +134,15 @@ fn step<C: Cx, const TURNS: bool>(
         let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
         let answer = search::<C, TURNS>(cx, m, &line, counts);
         let (alpha, cost) = (cx.get(&answer.alpha), cx.get(&answer.cost));
-        for (j, qdd) in b.joint_qdd.iter_mut().enumerate() {
-            let moved = alpha.fma(w.step[j], cx.get(qdd));
-            cx.set(qdd, moved);
+        for segment in problem.search.segments() {
+            let here = own.has(segment.start);
+            if cx.anywhere(here) {
+                for j in segment {
+                    let before = cx.get(&b.joint_qdd[j]);
+                    let moved = alpha.fma(w.step[j], before);
+                    cx.set(&mut b.joint_qdd[j], C::F::select(here, moved, before));
+                }
+            }
         }
         let stays = !zero.lt(alpha.abs());
         // a step that lost is followed by another one
