@@ -63,14 +63,14 @@ pub fn mujoco(name: &'static str) -> Case {
     let case = of_mujoco(name);
     let m = &case.m;
     assert!(m.contacts.classes.iter().any(|class| class.turns.is_some()));
-    assert!(m.mujoco.impedances.len() > 1 && !m.mujoco.springs.is_empty());
+    assert!(m.contacts.impedances.all.len() > 1 && !m.springs.joints.is_empty());
     case
 }
 
 /// A sensor of every type.
 pub fn sensors() -> Case {
     let case = of_mujoco("sensors");
-    assert!(case.m.mujoco.sensors.all.len() > 40 && case.m.mujoco.sensors.records > 1);
+    assert!(case.m.sensors.all.len() > 40 && case.m.sensors.records > 1);
     case
 }
 

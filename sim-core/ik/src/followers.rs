@@ -1,7 +1,7 @@
 //! Joints that follow others: mimic joints, and MuJoCo's equalities of joints; and the equalities that stay equations.
 
 use sim_model::Model;
-use sim_physics::constants::mujoco::Term;
+use sim_physics::constants::springs::Term;
 use sim_physics::constants::ties::{Lengths, Measure, TieLaw};
 
 /// Where a leader without a range is looked for if its follower has one, and does not follow along a line [rad or m].
@@ -44,7 +44,7 @@ impl Couplings {
                 polynomial: [equality.offset, equality.multiplier, 0.0, 0.0, 0.0],
             });
         }
-        for tie in &m.mujoco.ties {
+        for tie in &m.ties {
             let TieLaw::Equality(place) = tie.law else {
                 continue;
             };

@@ -29,7 +29,7 @@ pub fn frame(model: &Model, name: &str) -> Result<Mount<f64>, IkError> {
         return Ok(m.sites[site].mount.clone());
     }
     if let Some(site) = at(model.mujoco_site_names()) {
-        return Ok(m.mujoco.frames.sites[site].clone());
+        return Ok(m.outputs.sites[site].clone());
     }
     let names = frame_names(model);
     let more = if names.len() > SHOWN { ", …" } else { "" };

@@ -251,7 +251,7 @@ fn dofs_of(lengths: &Lengths<f64>) -> impl Iterator<Item = usize> + '_ {
 
 /// Frames that the model ties together, by equalities that act at its start.
 fn closures(model: &Model) -> Vec<Reach> {
-    let ties = model.constants().mujoco.ties.iter();
+    let ties = model.constants().ties.iter();
     let frames = ties.filter_map(|tie| match (&tie.measure, tie.law) {
         (Measure::Frames(frames), TieLaw::Equality(place)) => {
             let mounts = [&frames.first, &frames.second];
@@ -322,7 +322,7 @@ fn joints(model: &Model, variables: &[usize], limits: bool) -> Vec<Joint> {
 
 /// Largest turn of a ball that has one [rad].
 fn turn_max(model: &Model, body: &Body<f64>) -> Option<f64> {
-    let ties = model.constants().mujoco.ties.iter();
+    let ties = model.constants().ties.iter();
     let largest = ties.filter_map(|tie| match (&tie.measure, tie.law) {
         (Measure::Angle(_, dof), TieLaw::Range([_, most])) if *dof == body.dof => Some(most),
         _ => None,

@@ -221,13 +221,13 @@ impl Model {
             scan_rays: self.constants.scans.iter().map(HeightScan::rays).sum(),
             contact_sensors: self.contact_sensors.len(),
             actuators: self.actuator_names.len(),
-            activations: self.constants.mujoco.activations,
-            mocaps: self.constants.mujoco.mocaps,
-            equalities: self.constants.mujoco.equalities,
-            mujoco_bodies: self.constants.mujoco.frames.bodies.len(),
-            mujoco_sites: self.constants.mujoco.frames.sites.len(),
-            mujoco_geoms: self.constants.mujoco.frames.geoms.len(),
-            sensordata: self.constants.mujoco.sensors.scalars,
+            activations: self.constants.actuators.activations,
+            mocaps: self.constants.mocaps,
+            equalities: self.constants.switches,
+            mujoco_bodies: self.constants.outputs.bodies.len(),
+            mujoco_sites: self.constants.outputs.sites.len(),
+            mujoco_geoms: self.constants.outputs.geoms.len(),
+            sensordata: self.constants.sensors.scalars,
         }
     }
     /// State and commands after a reset.

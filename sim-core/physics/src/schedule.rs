@@ -2,7 +2,7 @@
 
 use crate::arrays::{Field, Source};
 use crate::constants::Constants;
-use crate::constants::mujoco::Integrator;
+use crate::constants::options::Integrator;
 use crate::lane::Real;
 use crate::step::{Runs, StageId};
 
@@ -10,7 +10,7 @@ use crate::step::{Runs, StageId};
 pub fn step_stages<R: Real>(m: &Constants<R>) -> Vec<StageId> {
     let stages = StageId::all().filter(|stage| stage.row().runs != Runs::Evaluation);
     let stages: Vec<StageId> = stages.filter(|stage| stage.is_needed(m)).collect();
-    if m.mujoco.integrator != Integrator::RungeKutta {
+    if m.integrator != Integrator::RungeKutta {
         return stages;
     }
     // a Runge-Kutta step evaluates its forces four times; commands come due once

@@ -119,8 +119,8 @@ impl Commands {
 /// What a scene is commanded by: controls of its actuators, targets of its drives, or torques.
 fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
     let m = model.constants();
-    if !m.mujoco.actuators.is_empty() {
-        let channel = |(k, actuator): (usize, &sim_physics::constants::mujoco::Actuator<f64>)| {
+    if !m.actuators.all.is_empty() {
+        let channel = |(k, actuator): (usize, &sim_physics::constants::actuators::Actuator<f64>)| {
             let [low, high] = actuator.ctrl_range.unwrap_or([-HALF_RANGE, HALF_RANGE]);
             Channel {
                 middle: start.map_or((low + high) / 2.0, |key| key.ctrl[k]),
@@ -128,7 +128,7 @@ fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
                 high,
             }
         };
-        let actuators = m.mujoco.actuators.iter().enumerate();
+        let actuators = m.actuators.all.iter().enumerate();
         return (Field::Ctrl, actuators.map(channel).collect());
     }
     let targets = &model.start().joint_target_q;

@@ -6,7 +6,7 @@ use sim_physics::lane::Real;
 
 /// Whether there are any.
 pub(super) fn are_in<R: Real>(m: &Constants<R>) -> bool {
-    let sensors = m.mujoco.sensors.all.iter();
+    let sensors = m.sensors.all.iter();
     sensors
         .clone()
         .any(|sensor| matches!(sensor.kind, SensorKind::Clock))
@@ -14,7 +14,7 @@ pub(super) fn are_in<R: Real>(m: &Constants<R>) -> bool {
 
 /// Writes the clocks of a world at this time [s] to its row of `sensordata`.
 pub(super) fn put<R: Real>(m: &Constants<R>, time: f64, row: &mut [R]) {
-    for sensor in &m.mujoco.sensors.all {
+    for sensor in &m.sensors.all {
         if let SensorKind::Clock = sensor.kind {
             let most = sensor.cutoff.as_ref().map(|cutoff| cutoff.most.to_f64());
             row[sensor.first] = R::of(time.min(most.unwrap_or(f64::INFINITY)));

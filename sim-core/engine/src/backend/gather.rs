@@ -144,7 +144,7 @@ fn jacobian<C: Cx>(
         to[row * dofs + l.dof] = C::F::select(zero.lt(cx.get(&weight[row])), *side, zero);
         row += 1;
     }
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for own in 0..tie.rows {
             let active = zero.lt(cx.get(&weight[row]));
             for (entry, &dof) in ties[tie.jacobian(own)].iter().zip(&tie.dofs) {

@@ -7,10 +7,10 @@ use super::ties::terms;
 use crate::description::{self, ActuatorActivation, ActuatorLength};
 use crate::pose::Pose;
 use sim_physics::constants::Body;
-use sim_physics::constants::actuator::{
-    Activation, ActivationRate, LengthKind, Sites, TurningLength,
+use sim_physics::constants::actuators::{
+    Activation, ActivationRate, Actuator, Actuators, LengthKind, Sites, TurningLength,
 };
-use sim_physics::constants::mujoco::{Actuator, Mujoco, Term};
+use sim_physics::constants::springs::Term;
 
 /// What an actuator refers to.
 pub(super) struct Scene<'a> {
@@ -23,14 +23,14 @@ pub(super) struct Scene<'a> {
 }
 
 /// Adds an actuator to those before it.
-pub(super) fn add(to: &mut Mujoco<f64>, own: &description::Actuator, scene: &Scene<'_>) {
+pub(super) fn add(to: &mut Actuators<f64>, own: &description::Actuator, scene: &Scene<'_>) {
     let (terms, turning) = length(&own.length, scene, moments(to));
     let activation = own.activation.map(|own| {
         let place = to.activations;
         to.activations += 1;
         activation(&own, place, scene.dt)
     });
-    to.actuators.push(Actuator {
+    to.all.push(Actuator {
         terms,
         turning,
         activation,
@@ -42,8 +42,8 @@ pub(super) fn add(to: &mut Mujoco<f64>, own: &description::Actuator, scene: &Sce
 }
 
 /// Moments of the actuators so far.
-fn moments(of: &Mujoco<f64>) -> usize {
-    let turning = of.actuators.iter().filter_map(|own| own.turning.as_ref());
+fn moments(of: &Actuators<f64>) -> usize {
+    let turning = of.all.iter().filter_map(|own| own.turning.as_ref());
     turning.map(|length| length.dofs.len()).sum()
 }
 

@@ -10,7 +10,11 @@ use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, SensorInfo, Start};
 use crate::pose::Pose;
-use sim_physics::constants::mujoco::{ActuatorBound, Mujoco, Tendon, TendonBound};
+use sim_physics::constants::actuators::{ActuatorBound, Actuators, TendonBound};
+use sim_physics::constants::outputs::OutputFrames;
+use sim_physics::constants::passive::{Drag, GravityCompensation};
+use sim_physics::constants::sensors::Sensors;
+use sim_physics::constants::springs::{Springs, Tendon};
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -28,12 +32,20 @@ pub(super) struct BodyBuilder {
     pub coord_names: Vec<String>,
     pub body_names: Vec<String>,
     pub start: Start,
-    pub mujoco: Mujoco<f64>,
+    pub springs: Springs<f64>,
+    pub free_joints: Vec<usize>,
+    pub drags: Vec<Drag<f64>>,
+    pub compensation: GravityCompensation<f64>,
+    pub actuators: Actuators<f64>,
+    pub switches: usize,
+    pub mocaps: usize,
+    pub outputs: OutputFrames<f64>,
+    pub sensors: Sensors<f64>,
     pub constraints: Vec<DofConstraint>,
     pub actuator_names: Vec<String>,
     pub mocap_names: Vec<String>,
     pub equality_names: Vec<String>,
-    pub sensors: Vec<SensorInfo>,
+    pub sensor_infos: Vec<SensorInfo>,
     pub refused_sensors: Vec<String>,
     /// First moment of what stands still in MuJoCo models [kg·m].
     pub static_moment: [f64; 3],
@@ -282,10 +294,10 @@ impl BodyBuilder {
         carriers: &[Carrier],
     ) {
         let first_link = self.frames.len() - robot.links.len();
-        let first_body = self.mujoco.frames.bodies.len();
+        let first_body = self.outputs.bodies.len();
         let (first_actuator, first_constraint) =
             (self.actuator_names.len(), self.constraints.len());
-        add_frames(&mut self.mujoco.frames, parts, carriers, first_link);
+        add_frames(&mut self.outputs, parts, carriers, first_link);
         for index in robot.moving_joints() {
             let (joint, own) = (&robot.joints[index], &parts.joints[index]);
             let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();
@@ -300,14 +312,13 @@ impl BodyBuilder {
             self.add_passive(joint, own, dofs.clone());
             if let Some(range) = own.actuator_range {
                 let dof = dofs.start;
-                self.mujoco
-                    .actuator_bounds
-                    .push(ActuatorBound { dof, range });
+                let bounds = &mut self.actuators.dof_bounds;
+                bounds.push(ActuatorBound { dof, range });
             }
         }
         self.add_compensations(robot, parts, carriers);
         self.add_drags(parts, carriers);
-        let first_equality = self.mujoco.equalities;
+        let first_equality = self.switches;
         for constraint in &parts.constraints {
             let own = DofConstraint::new(
                 constraint,
@@ -321,22 +332,22 @@ impl BodyBuilder {
             self.couplings.extend(own.couplings());
             self.constraints.push(own);
         }
-        self.mujoco.equalities += parts.equalities.len();
+        self.switches += parts.equalities.len();
         for (name, is_active) in &parts.equalities {
             self.equality_names.push(format!("{}/{name}", robot.name));
             self.start.eq_active.push(f64::from(u8::from(*is_active)));
         }
         for tendon in &parts.tendons {
-            self.mujoco.tendons.push(Tendon {
+            self.springs.tendons.push(Tendon {
                 terms: terms(&tendon.terms, dof_of),
                 stiffness: tendon.stiffness,
                 rest: tendon.rest,
                 damping: tendon.damping,
             });
         }
-        let first = self.mujoco.actuators.len();
+        let first = self.actuators.all.len();
         for (actuators, range) in &parts.tendon_bounds {
-            self.mujoco.tendon_bounds.push(TendonBound {
+            self.actuators.tendon_bounds.push(TendonBound {
                 actuators: actuators.iter().map(|k| first + k).collect(),
                 range: *range,
             });
@@ -350,7 +361,7 @@ impl BodyBuilder {
                 bodies: &self.bodies,
                 dt: self.dt,
             };
-            actuators::add(&mut self.mujoco, actuator, &scene);
+            actuators::add(&mut self.actuators, actuator, &scene);
         }
         self.add_sensors(
             robot,

@@ -8,7 +8,7 @@ use super::mujoco_contacts::add_touched_bodies;
 use crate::description::Description;
 use crate::error::ModelError;
 use sim_physics::constants::contact::{
-    Class, Column, Contacts, FrictionCombine, Kind, Pair, Run, pair, row,
+    Class, Column, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run, pair, row,
 };
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::constants::{Constants, Coupled, Impedance};
@@ -55,21 +55,13 @@ pub(super) fn add_contacts(
         |p| reaches[p],
         &names,
     )?;
-    let softness = builder.softness(&mut contacts, &pairs);
+    builder.add_impedances(&mut contacts, &pairs);
     contacts.solids = pieces.iter().map(|piece| piece.solid.clone()).collect();
     constants.coupled = coupled;
     constants.contacts = contacts;
-    if let Some((impedances, of_pairs, of_classes)) = softness {
-        constants.mujoco.impedances = impedances;
-        constants.mujoco.pair_impedance = of_pairs;
-        constants.mujoco.class_impedances = of_classes;
-    }
     add_touched_bodies(constants);
     Ok(())
 }
-
-/// Impedances, each once; the table that says which of them a pair has; those of each class.
-type PairSoftness = (Vec<Impedance<f64>>, Fixed, Vec<Vec<usize>>);
 
 impl ContactBuilder<'_> {
     fn fill(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) -> Coupled {
@@ -167,12 +159,8 @@ impl ContactBuilder<'_> {
         columns
     }
 
-    /// Impedances of the pairs; `None` where all have the scene's.
-    fn softness(
-        &self,
-        contacts: &mut Contacts<f64>,
-        pairs: &[(usize, usize)],
-    ) -> Option<PairSoftness> {
+    /// Gives pairs their impedances, unless all have that of the scene.
+    fn add_impedances(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) {
         let mut impedances: Vec<Impedance<f64>> = Vec::new();
         let mut of_pairs = Vec::new();
         for &pair in pairs {
@@ -184,7 +172,7 @@ impl ContactBuilder<'_> {
             }
         }
         if impedances == [self.constants.contact_impedance] {
-            return None;
+            return;
         }
         let of_class = |class| {
             let own = contacts.pairs.iter().zip(&of_pairs);
@@ -193,14 +181,18 @@ impl ContactBuilder<'_> {
             own.into_iter().collect()
         };
         let of_classes = (0..contacts.classes.len()).map(of_class).collect();
-        let table = Fixed {
+        let of_pair = Fixed {
             base: contacts.tables.numbers.len(),
             stride: 1,
             rows: pairs.len(),
         };
         let places = of_pairs.iter().map(|&place| place as f64);
         contacts.tables.numbers.extend(places);
-        Some((impedances, table, of_classes))
+        contacts.impedances = PairImpedances {
+            all: impedances,
+            of_pair,
+            of_classes,
+        };
     }
 
     /// Gives classes that have torsional friction a second block of rows. Returns whether there is any.

@@ -24,7 +24,7 @@ impl BodyBuilder {
             parent: None,
             tree: self.trees.len() - 1,
             dof: self.dofs.len(),
-            coord: self.mujoco.mocaps,
+            coord: self.mocaps,
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             exchange: None,
             quat: Pose::identity().quat,
@@ -34,7 +34,7 @@ impl BodyBuilder {
             inertia: [0.0; 6],
             parts: Vec::new(),
         });
-        self.mujoco.mocaps += 1;
+        self.mocaps += 1;
         Carrier {
             body: Some(self.bodies.len() - 1),
             tree: self.trees.len() - 1,

@@ -35,10 +35,15 @@ use constraint_rows::{IMPEDANCE, add_rows};
 use contact_pieces::{Rules, connected, placed_shapes};
 use contacts::add_contacts;
 use inverse_weight::Reference;
+use sim_physics::constants::actuators::{Actuator, Actuators};
 use sim_physics::constants::contact::Contacts;
-use sim_physics::constants::mujoco::{Actuator, Integrator, Mujoco, Search};
+use sim_physics::constants::options::{Integrator, Newton, Search};
+use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::params::{Param, SceneStarts, Varying};
-use sim_physics::constants::{Body, Constants, Coupled, Delay, Newton};
+use sim_physics::constants::passive::GravityCompensation;
+use sim_physics::constants::sensors::Sensors;
+use sim_physics::constants::springs::Springs;
+use sim_physics::constants::{Body, Constants, Coupled, Delay};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -98,12 +103,24 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             ls_iterations: scene.solver.ls_iterations,
             tolerance: 0.0,
             refinements: 0,
+            search: None,
         },
         varying: Varying::default(),
         delay: Delay::default(),
         sites,
         scans: Vec::new(),
-        mujoco: Mujoco::default(),
+        integrator: Integrator::default(),
+        springs: Springs::default(),
+        free_joints: Vec::new(),
+        drags: Vec::new(),
+        compensation: GravityCompensation::default(),
+        ties: Vec::new(),
+        tie_of_row: Vec::new(),
+        switches: 0,
+        actuators: Actuators::default(),
+        mocaps: 0,
+        outputs: OutputFrames::default(),
+        sensors: Sensors::default(),
     };
     let mut reference = inverse_weight::at_reference(&constants, &builder.dof_names)?;
     take_inverse_weights(scene, &builder.robots, &mut reference);
@@ -130,16 +147,24 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         &reference.dof_inverse_weight,
         scene.params.contains(&Param::JointFriction),
     );
-    let of_activations = builder.actuator_names.iter().zip(&builder.mujoco.actuators);
+    let of_activations = builder.actuator_names.iter().zip(&builder.actuators.all);
     let activation_names = of_activations
         .filter(|(_, actuator)| actuator.activation.is_some())
         .map(|(name, _)| name.clone())
         .collect();
-    constants.mujoco = builder.mujoco;
+    constants.springs = builder.springs;
+    constants.free_joints = builder.free_joints;
+    constants.drags = builder.drags;
+    constants.compensation = builder.compensation;
+    constants.switches = builder.switches;
+    constants.actuators = builder.actuators;
+    constants.mocaps = builder.mocaps;
+    constants.outputs = builder.outputs;
+    constants.sensors = builder.sensors;
     passive::keep_acting(&mut constants, scene);
     let constraint_of_tie = ties::add_ties(&mut constants, builder.constraints);
     mujoco_sensors::finish_sensors(
-        &mut constants.mujoco.sensors,
+        &mut constants.sensors,
         builder.static_moment,
         &constraint_of_tie,
     );
@@ -151,9 +176,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
             .filter_map(|robot| robot.mujoco.as_ref())
     };
     if let Some(parts) = models().next() {
-        constants.mujoco.integrator = parts.integrator;
+        constants.integrator = parts.integrator;
         // of several models, what all of them allow
-        constants.mujoco.search = Some(Search {
+        constants.solver.search = Some(Search {
             tolerance: scene.solver.tolerance,
             ls_tolerance: models()
                 .map(|parts| parts.ls_tolerance)
@@ -174,7 +199,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         mujoco: scene.robots.iter().map(|r| r.mujoco.as_deref()).collect(),
     };
     add_contacts(&mut constants, scene, &placed, &rules)?;
-    if let Some(search) = &mut constants.mujoco.search {
+    if let Some(search) = &mut constants.solver.search {
         search.classes = classes_of_roots(&search.roots, &constants.contacts);
     }
     constants.scans = scene.placed_scans(&builder.carriers, &constants.contacts)?;
@@ -206,7 +231,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         }
     }
 
-    let activations = constants.mujoco.activations;
+    let activations = constants.actuators.activations;
     let keyframes = keyframes::states(
         &scene.robots,
         &builder.robots,
@@ -227,7 +252,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         mocap_names: builder.mocap_names,
         equality_names: builder.equality_names,
         actuator_names: builder.actuator_names,
-        sensors: builder.sensors,
+        sensors: builder.sensor_infos,
         refused_sensors: builder.refused_sensors,
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         mujoco_site_names: mujoco_site_names(scene),
@@ -370,15 +395,15 @@ fn is_damped(m: &Constants<f64>, scene: &Description, implicit_damping: bool) ->
     let varies = varies.iter().any(|param| scene.params.contains(param));
     let of_actuators =
         |actuator: &Actuator<f64>| varies || actuator.gain[2] != 0.0 || actuator.bias[2] != 0.0;
-    match m.mujoco.integrator {
+    match m.integrator {
         Integrator::Euler => m.damped && implicit_damping,
         Integrator::RungeKutta => false,
         Integrator::ImplicitFast => {
-            let tendons = &m.mujoco.tendons;
+            let tendons = &m.springs.tendons;
             m.damped
-                || !m.mujoco.free_joints.is_empty()
-                || !m.mujoco.drags.is_empty()
-                || m.mujoco.actuators.iter().any(of_actuators)
+                || !m.free_joints.is_empty()
+                || !m.drags.is_empty()
+                || m.actuators.all.iter().any(of_actuators)
                 || tendons.iter().any(|tendon| tendon.damping != 0.0)
         }
     }

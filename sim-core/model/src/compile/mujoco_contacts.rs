@@ -3,14 +3,14 @@
 use super::contact_pieces::PlacedShape;
 use crate::description::{Description, MujocoParts, Sense, Shape, Touching};
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::{Contacts, Kind};
+use sim_physics::constants::contact::{Contacts, Kind, TouchedBodies};
 use sim_physics::constants::sensors::SensorKind;
 use sim_physics::lane::Fixed;
 use std::collections::BTreeSet;
 
 /// Gives each class of contacts the bodies of MuJoCo models that it acts on, and each pair their places in that list.
 pub(super) fn add_touched_bodies(constants: &mut Constants<f64>) {
-    let bodies = &constants.mujoco.frames.bodies;
+    let bodies = &constants.outputs.bodies;
     if bodies.is_empty() {
         return;
     }
@@ -36,11 +36,13 @@ pub(super) fn add_touched_bodies(constants: &mut Constants<f64>) {
             places.push(place.map_or(0.0, |place| (place + 1) as f64));
         }
     }
-    constants.mujoco.class_bodies = of_classes;
-    constants.mujoco.pair_bodies = Fixed {
-        base: contacts.tables.numbers.len(),
-        stride: 2,
-        rows: contacts.pairs.len(),
+    contacts.bodies = TouchedBodies {
+        of_pair: Fixed {
+            base: contacts.tables.numbers.len(),
+            stride: 2,
+            rows: contacts.pairs.len(),
+        },
+        of_classes,
     };
     contacts.tables.numbers.extend(places);
 }
@@ -71,7 +73,7 @@ pub(super) fn add_contact_sensors(
         false => -1.0,
     });
     let mut columns: Vec<Vec<f64>> = vec![orders.collect()];
-    let mut sensors = constants.mujoco.sensors.all.iter_mut();
+    let mut sensors = constants.sensors.all.iter_mut();
     let mut records = 0;
     for (robot, robot_parts) in scene.robots.iter().enumerate() {
         let Some(parts) = &robot_parts.mujoco else {
@@ -137,8 +139,8 @@ pub(super) fn add_contact_sensors(
     };
     let numbers = (0..both.len()).flat_map(|pair| columns.iter().map(move |column| column[pair]));
     constants.contacts.tables.numbers.extend(numbers);
-    constants.mujoco.sensors.pairs = table;
-    constants.mujoco.sensors.records = records;
+    constants.sensors.pairs = table;
+    constants.sensors.records = records;
 }
 
 /// Pairs of a plane and a capsule that a sensor is of, each with the capsule among the solids.

@@ -3,12 +3,12 @@
 use super::carrier::Carrier;
 use super::sites::mounted;
 use crate::description::{MujocoParts, OnLink};
-use sim_physics::constants::mujoco_frames::{MujocoBody, MujocoFrames};
+use sim_physics::constants::outputs::{OutputBody, OutputFrames};
 use sim_physics::constants::site::Mount;
 
 /// Adds the frames of a model. `carriers` has an entry for each of its links, `first_link` is the number of the first.
 pub(super) fn add_frames(
-    frames: &mut MujocoFrames<f64>,
+    frames: &mut OutputFrames<f64>,
     parts: &MujocoParts,
     carriers: &[Carrier],
     first_link: usize,
@@ -17,7 +17,7 @@ pub(super) fn add_frames(
     let mount = |on: &OnLink| mounted_on(carriers, on);
     for (link, inertia) in parts.frames.inertias.iter().enumerate() {
         let own = |pose| mounted_on(carriers, &OnLink { link, pose });
-        frames.bodies.push(MujocoBody {
+        frames.bodies.push(OutputBody {
             link: first_link + link,
             parent: first + parts.parents[link],
             root: first + root(&parts.parents, link),

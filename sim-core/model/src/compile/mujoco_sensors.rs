@@ -6,7 +6,7 @@ use super::mujoco_frames::mounted_on;
 use super::ties::terms;
 use crate::description::{Robot, Sense, SensorParts, ZonePart};
 use crate::model::SensorInfo;
-use sim_physics::constants::mujoco_frames::MujocoFrames;
+use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::sensors::{
     AccelerationSensor, ContactSensor, Cutoff, FrameSensor, RayGeom, Sensor, SensorKind, Sensors,
     TouchSensor, WrenchSensor, Zone,
@@ -24,7 +24,7 @@ struct Scope<'a> {
     welds: &'a [usize],
     dofs: &'a [Dof<f64>],
     trees: &'a [Tree<f64>],
-    frames: &'a MujocoFrames<f64>,
+    frames: &'a OutputFrames<f64>,
     /// Its first body among those of MuJoCo models.
     first_body: usize,
     /// Its first actuator.
@@ -45,9 +45,9 @@ impl BodyBuilder {
         [first_body, first_actuator, first_constraint]: [usize; 3],
     ) {
         let Some(parts) = &robot.mujoco else { return };
-        let first = self.mujoco.sensors.scalars;
+        let first = self.sensors.scalars;
         let refused = parts.sensors.refused.iter();
-        self.sensors
+        self.sensor_infos
             .extend(parts.sensors.all.iter().map(|sensor| SensorInfo {
                 name: format!("{}/{}", robot.name, sensor.name),
                 place: first + sensor.place.start..first + sensor.place.end,
@@ -60,17 +60,17 @@ impl BodyBuilder {
             welds: &parts.welds,
             dofs: &self.dofs,
             trees: &self.trees,
-            frames: &self.mujoco.frames,
+            frames: &self.outputs,
             first_body,
             first_actuator,
             first_constraint,
-            first_ray_geom: self.mujoco.sensors.geoms.len(),
+            first_ray_geom: self.sensors.geoms.len(),
         };
         let moment = scope.static_moment();
         for (sum, x) in self.static_moment.iter_mut().zip(moment) {
             *sum += x;
         }
-        add_sensors(&mut self.mujoco.sensors, &parts.sensors, &scope);
+        add_sensors(&mut self.sensors, &parts.sensors, &scope);
     }
 }
 

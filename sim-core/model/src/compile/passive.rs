@@ -6,8 +6,9 @@ use super::masses::massless;
 use crate::description::{Compensator, Description, Joint, MujocoJoint, MujocoParts, Robot};
 use crate::joint_kind::JointKind;
 use sim_physics::constants::Constants;
-use sim_physics::constants::mujoco::{Compensation, Drag, PoseSpring, Spring};
 use sim_physics::constants::params::Param;
+use sim_physics::constants::passive::{Compensation, Drag};
+use sim_physics::constants::springs::{PoseSpring, Spring};
 use std::ops::Range;
 
 impl BodyBuilder {
@@ -16,25 +17,25 @@ impl BodyBuilder {
         let body = self.dofs[dofs.start].body;
         let has_pose = matches!(joint.kind, JointKind::Ball | JointKind::Free);
         if own.stiffness != 0.0 && has_pose {
-            self.mujoco.pose_springs.push(PoseSpring {
+            self.springs.poses.push(PoseSpring {
                 body,
                 stiffness: own.stiffness,
                 position: own.spring_pose.pos,
                 quat: own.spring_pose.quat,
             });
         } else if own.stiffness != 0.0 {
-            self.mujoco.springs.push(Spring {
+            self.springs.joints.push(Spring {
                 dof: dofs.start,
                 stiffness: own.stiffness,
                 rest: own.spring_ref,
             });
         }
         if joint.kind == JointKind::Free {
-            self.mujoco.free_joints.push(body);
+            self.free_joints.push(body);
         }
         match own.compensator {
-            Compensator::Passive => self.mujoco.compensated.extend(dofs),
-            Compensator::Actuators => self.mujoco.compensated_by_actuators.extend(dofs),
+            Compensator::Passive => self.compensation.passive_dofs.extend(dofs),
+            Compensator::Actuators => self.compensation.actuated_dofs.extend(dofs),
             Compensator::Nothing => {}
         }
     }
@@ -49,7 +50,7 @@ impl BodyBuilder {
                 .body
                 .filter(|&body| !self.bodies[body].dofs().is_empty());
             if let Some(body) = body {
-                self.mujoco.drags.push(Drag {
+                self.drags.push(Drag {
                     body,
                     center: inertial.pos,
                     axes: columns(inertial.rotation()),
@@ -78,7 +79,7 @@ impl BodyBuilder {
             // one without mass may be given some
             let inertial = robot.links[link].inertial;
             let inertial = inertial.unwrap_or_else(|| massless(robot, link));
-            self.mujoco.compensations.push(Compensation {
+            self.compensation.links.push(Compensation {
                 body,
                 link: first + place,
                 mass: inertial.mass,
@@ -94,15 +95,15 @@ pub(super) fn keep_acting(m: &mut Constants<f64>, scene: &Description) {
     let varies = [Param::JointArmature, Param::JointDamping];
     let varies = varies.iter().any(|param| scene.params.contains(param));
     let (bodies, dofs) = (&m.bodies, &m.dofs);
-    m.mujoco.free_joints.retain(|&body| {
+    m.free_joints.retain(|&body| {
         let own = &dofs[bodies[body].dofs()];
         varies
             || own
                 .iter()
                 .any(|dof| dof.armature != 0.0 || dof.damping != 0.0)
     });
-    if m.mujoco.compensations.is_empty() {
-        m.mujoco.compensated.clear();
-        m.mujoco.compensated_by_actuators.clear();
+    if m.compensation.links.is_empty() {
+        m.compensation.passive_dofs.clear();
+        m.compensation.actuated_dofs.clear();
     }
 }

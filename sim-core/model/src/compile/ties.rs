@@ -5,7 +5,7 @@ use super::clusters::path;
 use super::constraint_rows::{FAR, own_soft};
 use super::sites::mounted;
 use crate::description::{Constraint, ConstraintLaw, Measure};
-use sim_physics::constants::mujoco::Term;
+use sim_physics::constants::springs::Term;
 use sim_physics::constants::ties::{self, Frames, Lengths, Tie, TieLaw};
 use sim_physics::constants::{Body, Constants, Motion};
 
@@ -178,7 +178,7 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
             .map(|(dof, other)| constants.pattern.at(dof, other))
             .collect();
         for law in laws {
-            let ties = &mut constants.mujoco.ties;
+            let ties = &mut constants.ties;
             let number = ties.len();
             constraint_of_tie.push(index);
             ties.push(Tie {
@@ -192,7 +192,7 @@ pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) 
                 places: places.clone(),
             });
             first += rows * dofs.len();
-            let tie_of_row = &mut constants.mujoco.tie_of_row;
+            let tie_of_row = &mut constants.tie_of_row;
             tie_of_row.extend(std::iter::repeat_n(number, rows));
         }
     }

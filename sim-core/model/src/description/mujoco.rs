@@ -6,8 +6,8 @@ use super::mujoco_sensors::SensorParts;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
-use sim_physics::constants::actuator::ActivationRate;
-use sim_physics::constants::mujoco::Integrator;
+use sim_physics::constants::actuators::ActivationRate;
+use sim_physics::constants::options::Integrator;
 
 /// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
 #[derive(Clone, Debug, PartialEq)]

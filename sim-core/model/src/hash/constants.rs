@@ -1,42 +1,18 @@
 //! Bodies, joints, rows of constraints, and options.
 
+use sim_physics::constants::options::Newton;
 use sim_physics::constants::scan::HeightScan;
 use sim_physics::constants::site::{Column, Mount, Site};
 use sim_physics::constants::{
     Body, Constants, Coupled, Delay, Dof, Equality, Frame, Friction, Impedance, Limit, MassEntry,
-    Motion, Newton, Part, Soft, Tree,
+    Motion, Part, Soft, Tree,
 };
 use sim_physics::math::factor::Pattern;
 
+use super::additions::Additions;
 use super::text::{Text, View, When, view, words};
 
 view! {
-    Constants<f64> as "Constants":
-        Always {
-            "dt": dt,
-            "gravity": gravity,
-            "bodies": bodies,
-            "dofs": dofs,
-            "trees": trees,
-            "frames": frames,
-            "damped": damped,
-            "mass_entries": mass_entries,
-            "mass_zeros": mass_zeros,
-            "coords": coords,
-            "equalities": equalities,
-            "frictions": frictions,
-            "limits": limits,
-            "pattern": pattern,
-            "coupled": coupled,
-            "contacts": contacts,
-            "contact_impedance": contact_impedance,
-            "solver": solver,
-            "varying": varying,
-            "delay": delay,
-            "sites": sites,
-        }
-        Later { "scans": scans }
-        Later { "mujoco": mujoco };
     Delay as "Delay":
         Always { "frames": frames, "substeps": substeps };
     Coupled as "Coupled":
@@ -117,7 +93,8 @@ view! {
             "ls_iterations": ls_iterations,
             "tolerance": tolerance,
             "refinements": refinements,
-        };
+        }
+        Never { "search": search };
     HeightScan<f64> as "HeightScan":
         Always {
             "mount": mount,
@@ -144,6 +121,69 @@ view! {
             "quat": quat,
             "rotation": rotation,
         };
+}
+
+impl View for Constants<f64> {
+    fn write(&self, text: &mut Text) {
+        let Constants {
+            dt,
+            gravity,
+            bodies,
+            dofs,
+            trees,
+            frames,
+            damped,
+            mass_entries,
+            mass_zeros,
+            coords,
+            equalities,
+            frictions,
+            limits,
+            pattern,
+            coupled,
+            contacts,
+            contact_impedance,
+            solver,
+            varying,
+            delay,
+            sites,
+            scans,
+            ..
+        } = self;
+        let first: [(&str, &dyn View); 21] = [
+            ("dt", dt),
+            ("gravity", gravity),
+            ("bodies", bodies),
+            ("dofs", dofs),
+            ("trees", trees),
+            ("frames", frames),
+            ("damped", damped),
+            ("mass_entries", mass_entries),
+            ("mass_zeros", mass_zeros),
+            ("coords", coords),
+            ("equalities", equalities),
+            ("frictions", frictions),
+            ("limits", limits),
+            ("pattern", pattern),
+            ("coupled", coupled),
+            ("contacts", contacts),
+            ("contact_impedance", contact_impedance),
+            ("solver", solver),
+            ("varying", varying),
+            ("delay", delay),
+            ("sites", sites),
+        ];
+        let scans: [(&str, &dyn View); 1] = [("scans", scans)];
+        let additions: [(&str, &dyn View); 1] = [("mujoco", &Additions::of(self))];
+        text.groups(
+            "Constants",
+            &[
+                (When::Always, &first),
+                (When::Later, &scans),
+                (When::Later, &additions),
+            ],
+        );
+    }
 }
 
 words! {

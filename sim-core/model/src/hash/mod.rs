@@ -4,9 +4,9 @@
 //! names, keys and their order, and say nothing by what the code calls a type or a field. A rename here is never needed and
 //! breaks every recording; `tests/model/hash.rs` and the recordings in `tests/data/recorded` show it.
 
+mod additions;
 mod constants;
 mod contacts;
-mod mujoco;
 mod sensors;
 mod start;
 mod text;

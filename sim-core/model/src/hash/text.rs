@@ -106,19 +106,19 @@ impl Write for Text {
 /// Views of structs: the name and the keys that the hash has for it, whatever the code calls them.
 ///
 /// A field that is missing here is a compile error: what is new gets `Later`, so that recordings of models without it stay
-/// readable. A field that was renamed keeps its key.
+/// readable. A field that was renamed keeps its key. Fields after `=>` are written by another view.
 macro_rules! view {
-    ($($type:ty as $name:literal: $($when:ident { $($key:literal: $field:ident),* $(,)? })*;)*) => {$(
+    ($($type:ty as $name:literal: $($when:ident { $($key:literal: $field:ident),* $(,)? })* $(=> $($other:ident),*)?;)*) => {$(
         impl $crate::hash::text::View for $type {
             fn write(&self, text: &mut $crate::hash::text::Text) {
-                let Self { $($($field,)*)* } = self;
+                let Self { $($($field,)*)* $($($other: _,)*)? } = self;
                 text.groups($name, &[$(
                     ($crate::hash::text::When::$when, &[$(($key, $field as &dyn $crate::hash::text::View)),*]),
                 )*]);
             }
 
             fn is_absent(&self) -> bool {
-                let Self { $($($field,)*)* } = self;
+                let Self { $($($field,)*)* $($($other: _,)*)? } = self;
                 true $($(&& $crate::hash::text::View::is_absent($field))*)*
             }
         }
@@ -145,6 +145,16 @@ macro_rules! words {
     )*};
 }
 pub(super) use words;
+
+impl<T: View + ?Sized> View for &T {
+    fn write(&self, text: &mut Text) {
+        (**self).write(text);
+    }
+
+    fn is_absent(&self) -> bool {
+        (**self).is_absent()
+    }
+}
 
 impl View for f64 {
     fn write(&self, text: &mut Text) {

@@ -6,7 +6,7 @@ use super::options::has_flag;
 use super::transmissions::Transmissions;
 use crate::description::{Actuator, ActuatorActivation, Robot};
 use crate::error::ModelError;
-use sim_physics::constants::actuator::ActivationRate;
+use sim_physics::constants::actuators::ActivationRate;
 
 /// Adds the actuators; [`super::refusals`] has named those that are not supported.
 pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), ModelError> {

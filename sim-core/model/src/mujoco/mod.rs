@@ -33,7 +33,7 @@ use crate::pose::Pose;
 pub use contents::{MujocoContents, MujocoElement};
 use format::ModelFile;
 pub use options::MujocoOptions;
-use sim_physics::constants::mujoco::Integrator;
+use sim_physics::constants::options::Integrator;
 
 impl Robot {
     /// Reads a model that MuJoCo compiled as one robot. Its link 0 is the world, which `options.pose` places.

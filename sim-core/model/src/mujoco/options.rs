@@ -5,7 +5,7 @@ use crate::description::{Description, Solver};
 use crate::error::ModelError;
 use crate::pose::Pose;
 use sim_physics::constants::contact::Cone;
-use sim_physics::constants::mujoco::Integrator;
+use sim_physics::constants::options::Integrator;
 
 /// How a model is read.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use super::define::{Flat, arrays};
 use super::element::{self, Element};
 use super::fields::{Axis, F64, FieldDtype, FieldRow, Group, I32, REAL, U32, U64};
 use crate::constants::Constants;
-use crate::constants::mujoco::Integrator;
+use crate::constants::options::Integrator;
 use crate::lane::{Num, Real};
 
 /// Who writes an array.
@@ -54,7 +54,7 @@ arrays! { m;
         // the solver's result, and its next start: that of `Constants::mujoco_search` between steps in MuJoCo's velocities
         joint_qdd: JointQdd [m.dofs.len()] Motion "rad/s² or m/s²"
             => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
-        act: Act [m.mujoco.activations] Motion "–"
+        act: Act [m.actuators.activations] Motion "–"
             => "act" State [Activations], "Activations of the actuators that have one, in their order, as MuJoCo's `act`.";
         // substeps since the start of the control frame
         substep: Substep [1] Counter "–";
@@ -82,9 +82,9 @@ arrays! { m;
         // 1 where the solver has not ended, at the first dof of an island
         busy: Busy [m.island_dofs()] Scratch "–";
         // contacts that a sensor shows
-        contact_records: ContactRecords [17 * m.mujoco.sensors.records] Scratch "–";
+        contact_records: ContactRecords [17 * m.sensors.records] Scratch "–";
         // torque, then force, of the contacts of each body of MuJoCo models
-        contact_wrench: ContactWrench [6 * m.mujoco.frames.bodies.len()] Scratch "N·m, N";
+        contact_wrench: ContactWrench [6 * m.outputs.bodies.len()] Scratch "N·m, N";
     }
     values {
         joint_f: JointF [Scalar; m.dofs.len()] Command "N·m or N"
@@ -93,13 +93,13 @@ arrays! { m;
             => "joint_target_q" Command [Dofs], "Position targets of the drives.";
         joint_target_qd: JointTargetQd [Scalar; m.dofs.len()] Command "rad/s or m/s"
             => "joint_target_qd" Command [Dofs], "Velocity targets of the drives.";
-        ctrl: Ctrl [Scalar; m.mujoco.actuators.len()] Command "–"
+        ctrl: Ctrl [Scalar; m.actuators.all.len()] Command "–"
             => "ctrl" Command [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
-        mocap_pos: MocapPos [Scalar; 3 * m.mujoco.mocaps] Command "m"
+        mocap_pos: MocapPos [Scalar; 3 * m.mocaps] Command "m"
             => "mocap_pos" Command [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
-        mocap_quat: MocapQuat [Scalar; 4 * m.mujoco.mocaps] Command "–"
+        mocap_quat: MocapQuat [Scalar; 4 * m.mocaps] Command "–"
             => "mocap_quat" Command [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
-        eq_active: EqActive [Scalar; m.mujoco.equalities] Command "–"
+        eq_active: EqActive [Scalar; m.switches] Command "–"
             => "eq_active" Command [Equalities], "1 where an equality of a MuJoCo model acts, 0 where it does not.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
         command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
@@ -128,38 +128,38 @@ arrays! { m;
             => "bias_force" [Dofs], "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
         smooth_force: SmoothForce [Scalar; m.dofs.len()] Stage "N·m or N"
             => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
-        actuator_length: ActuatorLength [Scalar; m.mujoco.actuators.len()] Stage "rad or m"
+        actuator_length: ActuatorLength [Scalar; m.actuators.all.len()] Stage "rad or m"
             => "actuator_length" [Actuators], "Length of each actuator, gear included.";
-        actuator_velocity: ActuatorVelocity [Scalar; m.mujoco.actuators.len()] Stage "rad/s or m/s"
+        actuator_velocity: ActuatorVelocity [Scalar; m.actuators.all.len()] Stage "rad/s or m/s"
             => "actuator_velocity" [Actuators], "How fast it changes.";
-        actuator_force: ActuatorForce [Scalar; m.mujoco.actuators.len()] Stage "N or N·m"
+        actuator_force: ActuatorForce [Scalar; m.actuators.all.len()] Stage "N or N·m"
             => "actuator_force" [Actuators], "Force of each actuator along its length.";
-        act_dot: ActDot [Scalar; m.mujoco.activations] Stage "1/s";
+        act_dot: ActDot [Scalar; m.actuators.activations] Stage "1/s";
         // moments of turning lengths, see `TurningLength::first`
-        actuator_moment: ActuatorMoment [Scalar; m.mujoco.actuators.iter().filter_map(|actuator| actuator.turning.as_ref()).map(|length| length.dofs.len()).sum::<usize>()] Stage "–";
-        qfrc_actuator: QfrcActuator [Scalar; if m.mujoco.actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
+        actuator_moment: ActuatorMoment [Scalar; m.actuators.all.iter().filter_map(|actuator| actuator.turning.as_ref()).map(|length| length.dofs.len()).sum::<usize>()] Stage "–";
+        qfrc_actuator: QfrcActuator [Scalar; if m.actuators.all.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
         // compensation of gravity, where it counts as a force of actuators
-        qfrc_gravcomp: QfrcGravcomp [Scalar; if m.mujoco.compensated_by_actuators.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
+        qfrc_gravcomp: QfrcGravcomp [Scalar; if m.compensation.actuated_dofs.is_empty() { 0 } else { m.dofs.len() }] Stage "N·m or N";
         // packed, see `math::factor::Pattern::at`
         mass_matrix: MassMatrix [Scalar; m.pattern.len()] Stage "kg·m², kg·m or kg";
         // +1 where the lower bound is the nearer, -1 where the upper is
         limit_side: LimitSide [Scalar; m.limits.len()] Stage "–";
 
         // Jacobians of ties, see `Tie::jacobian`
-        row_jacobian: RowJacobian [Scalar; m.mujoco.ties.iter().map(|tie| tie.rows * tie.dofs.len()).sum::<usize>()] Stage "–";
+        row_jacobian: RowJacobian [Scalar; m.ties.iter().map(|tie| tie.rows * tie.dofs.len()).sum::<usize>()] Stage "–";
 
         // the Runge-Kutta step: where it began, and sums of velocities and accelerations
-        rk_q: RkQ [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
-        rk_q_rest: RkQRest [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
-        rk_velocity: RkVelocity [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
-        rk_velocity_sum: RkVelocitySum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
-        rk_acceleration_sum: RkAccelerationSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
+        rk_q: RkQ [Scalar; if m.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
+        rk_q_rest: RkQRest [Scalar; if m.integrator == Integrator::RungeKutta { m.coords } else { 0 }] Stage "rad or m";
+        rk_velocity: RkVelocity [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
+        rk_velocity_sum: RkVelocitySum [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
+        rk_acceleration_sum: RkAccelerationSum [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
-        rk_warm_start: RkWarmStart [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
+        rk_warm_start: RkWarmStart [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
         // the same of activations: where they began, and sums of their rates
-        rk_act: RkAct [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.mujoco.activations } else { 0 }] Stage "–";
-        rk_act_rate_sum: RkActRateSum [Scalar; if m.mujoco.integrator == Integrator::RungeKutta { m.mujoco.activations } else { 0 }] Stage "1/s";
+        rk_act: RkAct [Scalar; if m.integrator == Integrator::RungeKutta { m.actuators.activations } else { 0 }] Stage "–";
+        rk_act_rate_sum: RkActRateSum [Scalar; if m.integrator == Integrator::RungeKutta { m.actuators.activations } else { 0 }] Stage "1/s";
 
         // contacts are in the tables of `Contacts::memory`; these arrays have no entries and represent them in `READS` and `WRITES`
         shape_poses: ShapePoses [Scalar; 0] Stage "–";
@@ -196,44 +196,44 @@ arrays! { m;
 
         passive_force: PassiveForce [Scalar; m.dofs.len()] Stage "N·m or N";
         // frames of MuJoCo models, in MuJoCo's order, frames and conventions
-        xpos: Xpos [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+        xpos: Xpos [Vec3; m.outputs.bodies.len()] Stage "m"
             => "xpos" [MujocoBodies, Size(3)], "Origin of each body of MuJoCo models in the world, the world of each model first.";
-        xquat: Xquat [MujocoQuat; m.mujoco.frames.bodies.len()] Stage "–"
+        xquat: Xquat [MujocoQuat; m.outputs.bodies.len()] Stage "–"
             => "xquat" [MujocoBodies, Size(4)], "Orientation of each body of MuJoCo models in the world, (w, x, y, z).";
-        xmat: Xmat [MujocoMat; m.mujoco.frames.bodies.len()] Stage "–"
+        xmat: Xmat [MujocoMat; m.outputs.bodies.len()] Stage "–"
             => "xmat" [MujocoBodies, Size(9)], "Orientation of each body of MuJoCo models in the world, a matrix row by row.";
-        xipos: Xipos [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+        xipos: Xipos [Vec3; m.outputs.bodies.len()] Stage "m"
             => "xipos" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models in the world.";
-        ximat: Ximat [MujocoMat; m.mujoco.frames.bodies.len()] Stage "–"
+        ximat: Ximat [MujocoMat; m.outputs.bodies.len()] Stage "–"
             => "ximat" [MujocoBodies, Size(9)], "Principal axes of inertia of each body of MuJoCo models in the world, a matrix row by row.";
-        site_xpos: SiteXpos [Vec3; m.mujoco.frames.sites.len()] Stage "m"
+        site_xpos: SiteXpos [Vec3; m.outputs.sites.len()] Stage "m"
             => "site_xpos" [MujocoSites, Size(3)], "Origin of each site of MuJoCo models in the world.";
-        site_xmat: SiteXmat [MujocoMat; m.mujoco.frames.sites.len()] Stage "–"
+        site_xmat: SiteXmat [MujocoMat; m.outputs.sites.len()] Stage "–"
             => "site_xmat" [MujocoSites, Size(9)], "Orientation of each site of MuJoCo models in the world, a matrix row by row.";
-        geom_xpos: GeomXpos [Vec3; m.mujoco.frames.geoms.len()] Stage "m"
+        geom_xpos: GeomXpos [Vec3; m.outputs.geoms.len()] Stage "m"
             => "geom_xpos" [MujocoGeoms, Size(3)], "Centre of each geom of MuJoCo models in the world, also of geoms that touch nothing.";
-        geom_xmat: GeomXmat [MujocoMat; m.mujoco.frames.geoms.len()] Stage "–"
+        geom_xmat: GeomXmat [MujocoMat; m.outputs.geoms.len()] Stage "–"
             => "geom_xmat" [MujocoGeoms, Size(9)], "Orientation of each geom of MuJoCo models in the world, a matrix row by row.";
         // from the reference point of the body's tree
-        subtree_center: SubtreeCenter [Vec3; m.mujoco.frames.bodies.len()] Stage "m";
-        subtree_mass: SubtreeMass [Scalar; m.mujoco.frames.bodies.len()] Stage "kg";
-        subtree_com: SubtreeCom [Vec3; m.mujoco.frames.bodies.len()] Stage "m"
+        subtree_center: SubtreeCenter [Vec3; m.outputs.bodies.len()] Stage "m";
+        subtree_mass: SubtreeMass [Scalar; m.outputs.bodies.len()] Stage "kg";
+        subtree_com: SubtreeCom [Vec3; m.outputs.bodies.len()] Stage "m"
             => "subtree_com" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
-        cvel: Cvel [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s, m/s"
+        cvel: Cvel [Row6; m.outputs.bodies.len()] Stage "rad/s, m/s"
             => "cvel" [MujocoBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
-        cinert: Cinert [MujocoInertia; m.mujoco.frames.bodies.len()] Stage "kg·m², kg·m, kg"
+        cinert: Cinert [MujocoInertia; m.outputs.bodies.len()] Stage "kg·m², kg·m, kg"
             => "cinert" [MujocoBodies, Size(10)], "Inertia of each body of MuJoCo models in world axes, about the point that `cvel` is about: xx, yy, zz, xy, xz, yz, then mass times the place of its centre, then mass, as MuJoCo's `cinert`; 0 for the world.";
-        subtree_linvel: SubtreeLinvel [Vec3; m.mujoco.frames.bodies.len()] Stage "m/s"
+        subtree_linvel: SubtreeLinvel [Vec3; m.outputs.bodies.len()] Stage "m/s"
             => "subtree_linvel" [MujocoBodies, Size(3)], "Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes.";
-        subtree_angmom: SubtreeAngmom [Vec3; m.mujoco.frames.bodies.len()] Stage "kg·m²/s"
+        subtree_angmom: SubtreeAngmom [Vec3; m.outputs.bodies.len()] Stage "kg·m²/s"
             => "subtree_angmom" [MujocoBodies, Size(3)], "Angular momentum of each body of MuJoCo models with all bodies below it, about their centre of mass, in world axes.";
-        cacc: Cacc [Row6; m.mujoco.frames.bodies.len()] Stage "rad/s², m/s²"
+        cacc: Cacc [Row6; m.outputs.bodies.len()] Stage "rad/s², m/s²"
             => "cacc" [MujocoBodies, Size(6)], "Acceleration of each body of MuJoCo models less gravity, as MuJoCo's `cacc`: angular, then linear, as a spatial vector at the point that `cvel` is about.";
-        cfrc_int: CfrcInt [Row6; m.mujoco.frames.bodies.len()] Stage "N·m, N"
+        cfrc_int: CfrcInt [Row6; m.outputs.bodies.len()] Stage "N·m, N"
             => "cfrc_int" [MujocoBodies, Size(6)], "Torque, then force, from the parent on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_int`.";
-        cfrc_ext: CfrcExt [Row6; m.mujoco.frames.bodies.len()] Stage "N·m, N"
+        cfrc_ext: CfrcExt [Row6; m.outputs.bodies.len()] Stage "N·m, N"
             => "cfrc_ext" [MujocoBodies, Size(6)], "Torque, then force, of contacts, body_f, connects and welds on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_ext`.";
-        sensordata: Sensordata [Scalar; m.mujoco.sensors.scalars] Stage "–"
+        sensordata: Sensordata [Scalar; m.sensors.scalars] Stage "–"
             => "sensordata" [Sensordata], "Sensors of MuJoCo models, in MuJoCo's order.";
 
         // body by body: acceleration, then force

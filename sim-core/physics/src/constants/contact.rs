@@ -1,5 +1,6 @@
 //! Shapes of a model as physics code reads them: where they are, which pairs may touch, and how soft they are.
 
+use super::Impedance;
 use super::clip::Cut;
 use super::height_field::FieldTables;
 use super::hull::HullTables;
@@ -104,6 +105,42 @@ recast! {
         pub keeps_max: Fixed,
         /// Whether capsules and boxes have MuJoCo's points: where one of these pairs is of a geom of MuJoCo's.
         pub mujoco_capsule_boxes: bool,
+        /// Impedances of pairs.
+        pub impedances: PairImpedances<R>,
+        /// Bodies that contacts act on, among those of outputs.
+        pub bodies: TouchedBodies,
+    }
+}
+
+recast! {
+    /// Impedances of contacts where pairs differ; all empty where all have `Constants::contact_impedance`.
+    #[derive(Clone, Debug)]
+    pub struct PairImpedances<R> {
+        /// Impedances, each once.
+        pub all: Vec<Impedance<R>>,
+        /// Of each pair of shapes, its place among them: a table with one column.
+        pub of_pair: Fixed,
+        /// Of each class of contacts, those that its pairs have.
+        pub of_classes: Vec<Vec<usize>>,
+    }
+}
+
+/// Bodies that contacts act on; all empty where no output asks for them.
+#[derive(Clone, Debug, Default)]
+pub struct TouchedBodies {
+    /// Of each pair of shapes, the bodies of its two sides as places in the list of its class, from 1; 0 for none.
+    pub of_pair: Fixed,
+    /// Of each class of contacts, the bodies that its contacts act on.
+    pub of_classes: Vec<Vec<usize>>,
+}
+
+impl<R> Default for PairImpedances<R> {
+    fn default() -> PairImpedances<R> {
+        PairImpedances {
+            all: Vec::new(),
+            of_pair: Fixed::default(),
+            of_classes: Vec::new(),
+        }
     }
 }
 
@@ -462,6 +499,8 @@ impl<R: Real> Contacts<R> {
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
             mujoco_capsule_boxes: false,
+            impedances: PairImpedances::default(),
+            bodies: TouchedBodies::default(),
         }
     }
 
@@ -472,4 +511,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory }
+same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory, TouchedBodies }

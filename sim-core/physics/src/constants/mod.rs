@@ -1,30 +1,38 @@
 //! Constants of a model as physics code reads them, in the precision of the run.
 
-pub mod actuator;
+pub mod actuators;
 pub mod clip;
 pub mod contact;
 pub mod height_field;
 pub mod hull;
-pub mod mujoco;
-pub mod mujoco_frames;
+pub mod options;
+pub mod outputs;
 pub mod pair_groups;
 pub mod params;
+pub mod passive;
 mod recast;
 pub mod scan;
 pub mod sensors;
 pub mod site;
 mod sizes;
+pub mod springs;
 pub mod ties;
 
 pub use self::recast::Recast;
 pub use self::sizes::Sizes;
 
+use self::actuators::Actuators;
 use self::contact::Contacts;
-use self::mujoco::{Mujoco, Search};
+use self::options::{Integrator, Newton, Search};
+use self::outputs::OutputFrames;
 use self::params::{COMMAND_NOISES, Varying};
+use self::passive::{Drag, GravityCompensation};
 use self::recast::{recast, same};
 use self::scan::HeightScan;
+use self::sensors::Sensors;
 use self::site::Site;
+use self::springs::Springs;
+use self::ties::Tie;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
 
@@ -76,8 +84,30 @@ recast! {
         pub sites: Vec<Site<R>>,
         /// Height scans.
         pub scans: Vec<HeightScan<R>>,
-        /// What only models from MuJoCo have.
-        pub mujoco: Mujoco<R>,
+        /// How a step integrates velocities.
+        pub integrator: Integrator,
+        /// Springs and dampers.
+        pub springs: Springs<R>,
+        /// Bodies of free joints whose armature and damping belong to MuJoCo's velocities.
+        pub free_joints: Vec<usize>,
+        /// What the medium does to links.
+        pub drags: Vec<Drag<R>>,
+        /// Links that are held against gravity.
+        pub compensation: GravityCompensation<R>,
+        /// Constraints whose Jacobians are found at run time.
+        pub ties: Vec<Tie<R>>,
+        /// Of each of their rows, its tie.
+        pub tie_of_row: Vec<usize>,
+        /// Equalities that clients switch on and off.
+        pub switches: usize,
+        /// Actuators.
+        pub actuators: Actuators<R>,
+        /// Bodies that clients place.
+        pub mocaps: usize,
+        /// Frames that outputs are of.
+        pub outputs: OutputFrames<R>,
+        /// Sensors.
+        pub sensors: Sensors<R>,
     }
 }
 
@@ -342,26 +372,11 @@ recast! {
     }
 }
 
-recast! {
-    /// Options of the constraint solver.
-    #[derive(Clone, Debug)]
-    pub struct Newton<R> {
-        /// Most iterations.
-        pub iterations: usize,
-        /// Most line-search evaluations per iteration.
-        pub ls_iterations: usize,
-        /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
-        pub tolerance: R,
-        /// Corrections of the accelerations in `f32` (`step/solver/refine.rs`).
-        pub refinements: usize,
-    }
-}
-
 impl<R: Real> Constants<R> {
     /// How the solver runs as MuJoCo's: for its models in `f64`.
     #[inline(always)]
     pub fn mujoco_search(&self) -> Option<&Search<R>> {
-        self.mujoco.search.as_ref().filter(|_| R::DOUBLE)
+        self.solver.search.as_ref().filter(|_| R::DOUBLE)
     }
 
     /// Dofs for which the solver keeps islands.
@@ -403,7 +418,7 @@ impl<R: Real> Constants<R> {
     /// Constraint rows: equalities, then frictions, then limits (MuJoCo's order), then those of ties.
     #[inline(always)]
     pub fn rows(&self) -> usize {
-        self.joint_rows() + self.mujoco.tie_of_row.len()
+        self.joint_rows() + self.tie_of_row.len()
     }
 
     /// The rows before those of ties.

@@ -1,8 +1,8 @@
 //! Sensors of MuJoCo models.
 
-use super::mujoco::Term;
 use super::recast::{Recast, recast, same};
 use super::site::Mount;
+use super::springs::Term;
 use crate::lane::{Fixed, Real};
 
 recast! {

@@ -1,9 +1,9 @@
 //! Constraints from MuJoCo whose Jacobians are found at run time: bodies that are connected, tendons, and limits of balls.
 
 use super::Soft;
-use super::mujoco::Term;
 use super::recast::{Recast, recast};
 use super::site::Mount;
+use super::springs::Term;
 use crate::lane::Real;
 
 recast! {

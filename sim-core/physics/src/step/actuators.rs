@@ -13,9 +13,10 @@
 use super::transmission::measure;
 use super::{BlockOf, ConstantsOf, Stage, param};
 use crate::arrays::Array as A;
-use crate::constants::actuator::{Activation, ActivationRate, TurningLength};
-use crate::constants::mujoco::{Actuator, TendonBound, Term};
+use crate::constants::actuators::{Activation, ActivationRate, TurningLength};
+use crate::constants::actuators::{Actuator, TendonBound};
 use crate::constants::params::Param;
+use crate::constants::springs::Term;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::Vec3;
@@ -48,27 +49,27 @@ impl Stage for Actuators {
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.actuators.is_empty()
+        !m.actuators.all.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         b.work.qfrc_actuator.fill(C::F::c(0.0));
-        for (k, actuator) in m.mujoco.actuators.iter().enumerate() {
+        for (k, actuator) in m.actuators.all.iter().enumerate() {
             if let Some(activation) = &actuator.activation {
                 b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
             }
         }
-        for bound in &m.mujoco.tendon_bounds {
+        for bound in &m.actuators.tendon_bounds {
             let scale = tendon_scale(cx, m, b, bound);
             for &k in &bound.actuators {
                 b.work.actuator_force[k] = scale;
             }
         }
-        for (k, actuator) in m.mujoco.actuators.iter().enumerate() {
+        for (k, actuator) in m.actuators.all.iter().enumerate() {
             let input = input(cx, b, actuator, k);
             let mut force = force(cx, m, b, k, input);
-            let mut bounds = m.mujoco.tendon_bounds.iter();
+            let mut bounds = m.actuators.tendon_bounds.iter();
             if bounds.any(|bound| bound.actuators.contains(&k)) {
                 force = force * b.work.actuator_force[k];
             }
@@ -86,11 +87,11 @@ impl Stage for Actuators {
                 }
             }
         }
-        for &dof in &m.mujoco.compensated_by_actuators {
+        for &dof in &m.compensation.actuated_dofs {
             let joint = &mut b.work.qfrc_actuator[dof];
             *joint = *joint + b.work.qfrc_gravcomp[dof];
         }
-        for bound in &m.mujoco.actuator_bounds {
+        for bound in &m.actuators.dof_bounds {
             let joint = &mut b.work.qfrc_actuator[bound.dof];
             *joint = bounded(*joint, Some(bound.range));
         }
@@ -111,7 +112,7 @@ fn tendon_scale<C: Cx>(
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut sum = zero;
     for &k in &bound.actuators {
-        let input = input(cx, b, &m.mujoco.actuators[k], k);
+        let input = input(cx, b, &m.actuators.all[k], k);
         sum = sum + force(cx, m, b, k, input);
     }
     // a sum of 0 stays, whatever the range is
@@ -172,7 +173,7 @@ fn input<C: Cx>(
 /// Force of actuator `k` before it is clamped; writes its length and velocity. `input` is its control or activation.
 #[inline(always)]
 fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, input: C::F) -> C::F {
-    let actuator = &m.mujoco.actuators[k];
+    let actuator = &m.actuators.all[k];
     let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
     if let Some(turning) = &actuator.turning {
         length = measure(cx, m, b, turning);
@@ -247,7 +248,7 @@ pub(super) fn is_damped<R: Real>(m: &Constants<R>, actuator: &Actuator<R>) -> bo
 #[inline(always)]
 pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
-    let actuators = m.mujoco.actuators.iter().enumerate();
+    let actuators = m.actuators.all.iter().enumerate();
     for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(m, actuator)) {
         let input = input(cx, b, actuator, k);
         let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
@@ -269,7 +270,7 @@ pub(super) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf
             subtract_swing(cx, m, b, length, damping);
         }
     }
-    for tendon in &m.mujoco.tendons {
+    for tendon in &m.springs.tendons {
         let damping = C::F::k(tendon.damping) * dt;
         add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
     }

@@ -192,15 +192,19 @@ impl<'a, C: Cx> Contact<'a, C> {
     /// d(r) of the contact's pair.
     #[inline(always)]
     fn impedance(&self, cx: &mut C, m: &ConstantsOf<C>, position: C::F) -> C::F {
-        let Some(kinds) = m.mujoco.class_impedances.get(self.number) else {
+        let Some(kinds) = m.contacts.impedances.of_classes.get(self.number) else {
             return impedance(&m.contact_impedance, position);
         };
-        let mut d = impedance(&m.mujoco.impedances[kinds[0]], position);
+        let mut d = impedance(&m.contacts.impedances.all[kinds[0]], position);
         if let [_, others @ ..] = &kinds[..] {
-            let own = cx.pick(m.mujoco.pair_impedance, self.pair, 0);
+            let own = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
             for &kind in others {
                 let is_it = (own - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
-                d = C::F::select(is_it, impedance(&m.mujoco.impedances[kind], position), d);
+                d = C::F::select(
+                    is_it,
+                    impedance(&m.contacts.impedances.all[kind], position),
+                    d,
+                );
             }
         }
         d

@@ -51,17 +51,17 @@ impl Stage for Energy {
                 potential = potential - gravity.dot(moment);
             }
         }
-        for spring in &m.mujoco.springs {
+        for spring in &m.springs.joints {
             let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
             let half = C::F::c(0.5 * spring.stiffness.to_f64());
             potential = (stretch * half).fma(stretch, potential);
         }
-        for tendon in &m.mujoco.tendons {
+        for tendon in &m.springs.tendons {
             let stretch = stretch(cx, m, b, tendon);
             let half = C::F::c(0.5 * tendon.stiffness.to_f64());
             potential = (stretch * half).fma(stretch, potential);
         }
-        for spring in &m.mujoco.pose_springs {
+        for spring in &m.springs.poses {
             let half = C::F::c(0.5 * spring.stiffness.to_f64());
             for stretch in pose_stretch(cx, m, b, spring) {
                 potential = half.fma(stretch.dot(stretch), potential);

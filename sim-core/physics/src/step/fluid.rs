@@ -15,7 +15,7 @@
 use super::{BlockOf, ConstantsOf, Stage, link_forces};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
-use crate::constants::mujoco::Drag;
+use crate::constants::passive::Drag;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::{ANGULAR, LINEAR};
 use crate::math::vec3::Vec3;
@@ -34,7 +34,7 @@ impl Stage for Fluid {
     const WRITES: &'static [A] = &[A::SmoothForce];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.drags.is_empty()
+        !m.drags.is_empty()
     }
 
     #[inline(always)]
@@ -51,7 +51,7 @@ impl Stage for Fluid {
 #[inline(always)]
 pub(super) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     link_forces::clear(w);
-    for drag in &m.mujoco.drags {
+    for drag in &m.drags {
         let flow = Flow::of(w, drag);
         let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
         for i in 0..3 {
@@ -103,7 +103,7 @@ impl<F: Num> Flow<F> {
 #[inline(always)]
 pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
-    for drag in &m.mujoco.drags {
+    for drag in &m.drags {
         let flow = Flow::of(w, drag);
         let tree = m.bodies[drag.body].tree;
         let last = m.bodies[drag.body].dofs().end - 1;

@@ -19,7 +19,7 @@
 use super::actuators::is_damped;
 use super::{BlockOf, ConstantsOf, param};
 use crate::arrays::{Block, Workspace};
-use crate::constants::mujoco::Integrator;
+use crate::constants::options::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, Num, Real, map};
@@ -50,7 +50,7 @@ fn of_dofs<F: Num>(
 /// Does a free body have armature and damping as MuJoCo has them?
 #[inline(always)]
 pub(super) fn has<R>(m: &Constants<R>, body: usize) -> bool {
-    m.mujoco.free_joints.contains(&body)
+    m.free_joints.contains(&body)
 }
 
 #[inline(always)]
@@ -91,7 +91,7 @@ pub(super) fn add_damping_forces<C: Cx>(
     b: &BlockOf<C>,
     to: &mut [C::F],
 ) {
-    for &body in &m.mujoco.free_joints {
+    for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
         let spin = spin(cx, b, first);
@@ -116,7 +116,7 @@ pub(super) fn add_swing_forces<C: Cx>(
     times: f64,
     to: &mut [C::F],
 ) {
-    for &body in &m.mujoco.free_joints {
+    for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
         let spin = spin(cx, b, first);
@@ -175,7 +175,7 @@ pub(super) fn add_armature<F: Num>(
 /// Adds Tᵀ A T a to the forces that accelerations need, `missing`.
 #[inline(always)]
 pub(super) fn add_armature_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    for &body in &m.mujoco.free_joints {
+    for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let (mut linear, mut angular) = (Vec3::zero(), Vec3::zero());
         for i in 0..3 {
@@ -197,7 +197,7 @@ pub(super) fn add_armature_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Blo
 #[inline(always)]
 pub(super) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
-    for &body in &m.mujoco.free_joints {
+    for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let damping = map(of_dofs(m, &b.params, Param::JointDamping, body), |x| x * dt);
         let spin = spin(cx, b, first);
@@ -214,7 +214,7 @@ pub(super) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
 /// accelerations.
 pub(super) fn solved<R: Real>(m: &Constants<R>) -> impl Iterator<Item = usize> + '_ {
     let bodies = (0..m.bodies.len()).filter(|&k| is_solved(m, k));
-    bodies.filter(|_| m.mujoco.integrator == Integrator::ImplicitFast)
+    bodies.filter(|_| m.integrator == Integrator::ImplicitFast)
 }
 
 /// Is a body one of [`solved`], where the integrator is implicit?
@@ -225,8 +225,8 @@ pub(super) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
         return false;
     }
     let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
-    let drags = m.mujoco.drags.iter().any(|drag| drag.body == body);
-    let mut actuators = m.mujoco.actuators.iter().filter(|own| is_damped(m, own));
+    let drags = m.drags.iter().any(|drag| drag.body == body);
+    let mut actuators = m.actuators.all.iter().filter(|own| is_damped(m, own));
     let driven = actuators.any(|own| {
         let dofs = own.turning.iter().flat_map(|length| &length.dofs);
         dofs.into_iter().any(|&dof| m.dofs[dof].body == body)

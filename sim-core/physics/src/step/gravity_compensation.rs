@@ -20,17 +20,17 @@ impl Stage for GravityCompensation {
     const WRITES: &'static [A] = &[A::SmoothForce, A::QfrcGravcomp];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.compensations.is_empty()
+        !m.compensation.links.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         forces::<C>(m, b);
         let w = &mut b.work;
-        for &d in &m.mujoco.compensated {
+        for &d in &m.compensation.passive_dofs {
             w.smooth_force[d] = w.smooth_force[d] + w.joint_force[d];
         }
-        if !m.mujoco.compensated_by_actuators.is_empty() {
+        if !m.compensation.actuated_dofs.is_empty() {
             w.qfrc_gravcomp.copy_from_slice(&w.joint_force);
         }
     }
@@ -42,7 +42,7 @@ pub(super) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let up = -gravity(m, &b.params);
     let (w, params) = (&mut b.work, &b.params);
     link_forces::clear(w);
-    for held in &m.mujoco.compensations {
+    for held in &m.compensation.links {
         let center = Vec3::constant(held.center);
         let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
         let mass = masses::mass(m, params, held.link, held.mass);

@@ -27,8 +27,8 @@ use super::kinematics::read_quat;
 use super::mujoco_state::keep_accelerations;
 use super::{BlockOf, ConstantsOf, Stage, actuators, fluid, free_joints, masses, param};
 use crate::arrays::Array as A;
-use crate::constants::actuator::Activation;
-use crate::constants::mujoco::Integrator;
+use crate::constants::actuators::Activation;
+use crate::constants::options::Integrator;
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num, Real};
@@ -72,7 +72,7 @@ impl Stage for Integrate {
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        m.mujoco.integrator != Integrator::RungeKutta
+        m.integrator != Integrator::RungeKutta
     }
 
     #[inline(always)]
@@ -91,7 +91,7 @@ impl Stage for Integrate {
             if body.motion == Motion::Free {
                 // a body that carries nothing is implicit in its gyroscopic force
                 let is_alone = m.bodies.iter().all(|other| other.parent != Some(k));
-                let is_implicit = m.mujoco.integrator == Integrator::ImplicitFast;
+                let is_implicit = m.integrator == Integrator::ImplicitFast;
                 if is_alone && is_implicit && !free_joints::is_solved(m, k) {
                     gyroscopic(cx, m, b, k);
                 }
@@ -110,7 +110,7 @@ impl Stage for Integrate {
 
 /// The activations of actuators.
 pub(super) fn activations<R>(m: &Constants<R>) -> impl Iterator<Item = &Activation<R>> {
-    let actuators = m.mujoco.actuators.iter();
+    let actuators = m.actuators.all.iter();
     actuators.filter_map(|actuator| actuator.activation.as_ref())
 }
 
@@ -146,7 +146,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
         }
     }
-    if m.mujoco.integrator == Integrator::ImplicitFast {
+    if m.integrator == Integrator::ImplicitFast {
         actuators::add_damping(cx, m, b);
         fluid::add_damping::<C>(m, b);
     }

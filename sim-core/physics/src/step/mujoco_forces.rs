@@ -15,7 +15,7 @@ use super::{BlockOf, ConstantsOf, Stage, masses, tied_frames};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::{row, turning};
-use crate::constants::mujoco_frames::MujocoBody;
+use crate::constants::outputs::OutputBody;
 use crate::constants::params::Param;
 use crate::constants::ties::{Frames, Measure};
 use crate::each;
@@ -43,13 +43,13 @@ impl Stage for Forces {
     const WRITES: &'static [A] = &[A::Cacc, A::CfrcInt, A::CfrcExt];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.bodies.is_empty()
+        !m.outputs.bodies.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let base = proper_accelerations(cx, m, b);
-        let bodies = &m.mujoco.frames.bodies;
+        let bodies = &m.outputs.bodies;
         for (k, body) in bodies.iter().enumerate() {
             accelerate(m, b, k, body, base);
         }
@@ -71,7 +71,7 @@ impl Stage for Forces {
             }
         }
         let mut row = m.joint_rows();
-        for tie in &m.mujoco.ties {
+        for tie in &m.ties {
             if let Measure::Frames(frames) = &tie.measure {
                 tie_wrenches(cx, m, b, frames, row);
             }
@@ -101,7 +101,7 @@ fn accelerate<F: Num, V>(
     m: &Constants<F::Real>,
     b: &mut crate::arrays::Block<F, V>,
     k: usize,
-    body: &MujocoBody<F::Real>,
+    body: &OutputBody<F::Real>,
     base: Vec3<F>,
 ) {
     let center = root_center(m, b, body);
@@ -147,7 +147,7 @@ fn add<F: Num, V>(
     force: Vec3<F>,
     torque: Vec3<F>,
 ) {
-    let arm = point - root_center(m, b, &m.mujoco.frames.bodies[k]);
+    let arm = point - root_center(m, b, &m.outputs.bodies[k]);
     let moved = six(arm.cross_add(force, torque), force);
     for (sum, x) in b.work.cfrc_ext[k].iter_mut().zip(moved) {
         *sum = *sum + x;
@@ -174,7 +174,7 @@ fn tie_wrenches<C: Cx>(
         (&frames.second, C::F::c(-1.0)),
     ];
     for (&k, (mount, sign)) in frames.bodies.iter().zip(sides) {
-        let body = &m.mujoco.frames.bodies[k];
+        let body = &m.outputs.bodies[k];
         if body.parent != k {
             let point = position(&b.work, mount);
             add(m, b, k, point, force * sign, torque * sign);
@@ -191,25 +191,21 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     let t = &m.contacts;
     for (number, class) in t.classes.iter().enumerate() {
-        let Some(bodies) = m
-            .mujoco
-            .class_bodies
-            .get(number)
-            .filter(|all| !all.is_empty())
-        else {
+        let touched = t.bodies.of_classes.get(number);
+        let Some(bodies) = touched.filter(|all| !all.is_empty()) else {
             continue;
         };
         let list = class_list(cx, t, number);
         each!(cx, r in list, {
             let pair = cx.load(t.memory.rows, r, row::PAIR);
             let sides = [
-                cx.pick(m.mujoco.pair_bodies, pair, 0),
-                cx.pick(m.mujoco.pair_bodies, pair, 1),
+                cx.pick(t.bodies.of_pair, pair, 0),
+                cx.pick(t.bodies.of_pair, pair, 1),
             ];
             let [point, force, torque] = contact_force(cx, m, number, r);
             let there = b.work.reference[class.trees.1];
             for (place, &k) in bodies.iter().enumerate() {
-                let body = &m.mujoco.frames.bodies[k];
+                let body = &m.outputs.bodies[k];
                 let slot = C::F::c((place + 1) as f64);
                 let [first, second] = map(sides, |side| {
                     let is_it = (side - slot).abs().lt(half);

@@ -22,13 +22,13 @@ impl Stage for Bodies {
     const WRITES: &'static [A] = &[A::Xpos, A::Xquat, A::Xmat, A::Xipos, A::Ximat];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.bodies.is_empty()
+        !m.outputs.bodies.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
-        for (k, body) in m.mujoco.frames.bodies.iter().enumerate() {
+        for (k, body) in m.outputs.bodies.iter().enumerate() {
             w.xpos[k] = in_world(w, &body.frame);
             let [x, y, z, real] = orientation(w, &body.frame);
             w.xquat[k] = [real, x, y, z];
@@ -47,13 +47,13 @@ impl Stage for Sites {
     const WRITES: &'static [A] = &[A::SiteXpos, A::SiteXmat];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.sites.is_empty()
+        !m.outputs.sites.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
-        for (k, site) in m.mujoco.frames.sites.iter().enumerate() {
+        for (k, site) in m.outputs.sites.iter().enumerate() {
             w.site_xpos[k] = in_world(w, site);
             w.site_xmat[k] = rows(&axes(w, site));
         }
@@ -68,13 +68,13 @@ impl Stage for Geoms {
     const WRITES: &'static [A] = &[A::GeomXpos, A::GeomXmat];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.geoms.is_empty()
+        !m.outputs.geoms.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
-        for (k, geom) in m.mujoco.frames.geoms.iter().enumerate() {
+        for (k, geom) in m.outputs.geoms.iter().enumerate() {
             w.geom_xpos[k] = in_world(w, geom);
             w.geom_xmat[k] = rows(&axes(w, geom));
         }

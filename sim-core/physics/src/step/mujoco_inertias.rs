@@ -26,7 +26,7 @@ impl Stage for Inertias {
     const WRITES: &'static [A] = &[A::Cinert];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.bodies.is_empty()
+        !m.outputs.bodies.is_empty()
     }
 
     #[inline(always)]
@@ -37,7 +37,7 @@ impl Stage for Inertias {
             axis[i] = one;
             axis
         };
-        let bodies = &m.mujoco.frames.bodies;
+        let bodies = &m.outputs.bodies;
         for (k, body) in bodies.iter().enumerate() {
             if body.parent == k {
                 b.work.cinert[k] = [zero; 10];

@@ -33,12 +33,12 @@ impl Stage for Momenta {
     const WRITES: &'static [A] = &[A::SubtreeLinvel, A::SubtreeAngmom];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.bodies.is_empty()
+        !m.outputs.bodies.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let bodies = &m.mujoco.frames.bodies;
+        let bodies = &m.outputs.bodies;
         // momenta, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
             let own = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));

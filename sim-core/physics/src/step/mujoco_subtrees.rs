@@ -11,7 +11,7 @@ use super::sites::{position, reference};
 use super::{BlockOf, ConstantsOf, Stage, masses};
 use crate::arrays::{Array as A, Block};
 use crate::constants::Constants;
-use crate::constants::mujoco_frames::MujocoBody;
+use crate::constants::outputs::OutputBody;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
 use crate::math::vec3::Vec3;
@@ -27,12 +27,12 @@ impl Stage for Subtrees {
     const WRITES: &'static [A] = &[A::SubtreeCenter, A::SubtreeMass, A::SubtreeCom, A::Cvel];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.frames.bodies.is_empty()
+        !m.outputs.bodies.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let bodies = &m.mujoco.frames.bodies;
+        let bodies = &m.outputs.bodies;
         // first moments, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
             let mass = masses::mass(m, &b.params, body.link, body.mass);
@@ -75,7 +75,7 @@ fn com_velocity<F: Num, V>(
     m: &Constants<F::Real>,
     b: &Block<F, V>,
     k: usize,
-    body: &MujocoBody<F::Real>,
+    body: &OutputBody<F::Real>,
 ) -> Spatial<F> {
     debug_assert!(body.root <= k);
     let w = &b.work;
@@ -97,10 +97,10 @@ fn com_velocity<F: Num, V>(
 pub(super) fn root_center<F: Num, V>(
     m: &Constants<F::Real>,
     b: &Block<F, V>,
-    body: &MujocoBody<F::Real>,
+    body: &OutputBody<F::Real>,
 ) -> Vec3<F> {
     let w = &b.work;
-    let root = &m.mujoco.frames.bodies[body.root];
+    let root = &m.outputs.bodies[body.root];
     let center = w.subtree_center[body.root];
     if root.frame.tree == body.frame.tree {
         return center;

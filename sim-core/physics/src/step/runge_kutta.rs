@@ -14,7 +14,7 @@ use super::kinematics::read_quat;
 use super::mujoco_state::{accelerations, free_bodies, halves, velocities};
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
-use crate::constants::mujoco::Integrator;
+use crate::constants::options::Integrator;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
@@ -36,7 +36,7 @@ impl Stage for Begin {
     const WRITES: &'static [A] = &[A::RkWarmStart];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        m.mujoco.integrator == Integrator::RungeKutta
+        m.integrator == Integrator::RungeKutta
     }
 
     #[inline(always)]
@@ -97,7 +97,7 @@ impl<const K: usize> Stage for RungeKutta<K> {
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        m.mujoco.integrator == Integrator::RungeKutta
+        m.integrator == Integrator::RungeKutta
     }
 
     #[inline(always)]

@@ -15,8 +15,8 @@ use super::{BlockOf, ConstantsOf, Stage, fluid, free_joints, gravity_compensatio
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::Motion;
-use crate::constants::mujoco::{PoseSpring, Tendon};
 use crate::constants::params::Param;
+use crate::constants::springs::{PoseSpring, Tendon};
 use crate::lane::{Cx, Num, Real, map};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
@@ -36,12 +36,11 @@ impl Stage for Springs {
     const WRITES: &'static [A] = &[A::SmoothForce];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        let parts = &m.mujoco;
         let are_there = [
-            !parts.springs.is_empty(),
-            !parts.tendons.is_empty(),
-            !parts.pose_springs.is_empty(),
-            !parts.free_joints.is_empty(),
+            !m.springs.joints.is_empty(),
+            !m.springs.tendons.is_empty(),
+            !m.springs.poses.is_empty(),
+            !m.free_joints.is_empty(),
         ];
         are_there.contains(&true)
     }
@@ -76,20 +75,20 @@ impl Stage for Passive {
         let mut passive = std::mem::take(&mut b.work.passive_force);
         for (j, force) in passive.iter_mut().enumerate() {
             let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
-            *force = match m.mujoco.free_joints.contains(&m.dofs[j].body) {
+            *force = match m.free_joints.contains(&m.dofs[j].body) {
                 true => C::F::c(0.0),
                 false => -(cx.get(&b.joint_qd[j]) * damping),
             };
         }
         add_springs(cx, m, b, &mut passive);
         free_joints::add_damping_forces(cx, m, b, &mut passive);
-        if !m.mujoco.compensations.is_empty() {
+        if !m.compensation.links.is_empty() {
             gravity_compensation::forces::<C>(m, b);
-            for &d in &m.mujoco.compensated {
+            for &d in &m.compensation.passive_dofs {
                 passive[d] = passive[d] + b.work.joint_force[d];
             }
         }
-        if !m.mujoco.drags.is_empty() {
+        if !m.drags.is_empty() {
             fluid::forces(m, &mut b.work);
             for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {
                 *force = *force + *own;
@@ -102,12 +101,12 @@ impl Stage for Passive {
 /// Adds the forces of springs, and of springs and dampers of tendons.
 #[inline(always)]
 fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
-    for spring in &m.mujoco.springs {
+    for spring in &m.springs.joints {
         let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
         let force = &mut to[spring.dof];
         *force = stretch.fnma(C::F::k(spring.stiffness), *force);
     }
-    for tendon in &m.mujoco.tendons {
+    for tendon in &m.springs.tendons {
         let stretch = stretch(cx, m, b, tendon);
         let mut velocity = C::F::c(0.0);
         for term in &tendon.terms {
@@ -121,7 +120,7 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
             *force = pull.fnma(C::F::k(term.coefficient), *force);
         }
     }
-    for spring in &m.mujoco.pose_springs {
+    for spring in &m.springs.poses {
         let body = &m.bodies[spring.body];
         let stiffness = C::F::k(spring.stiffness);
         let [slide, turn] = map(pose_stretch(cx, m, b, spring), |x| x * stiffness);

@@ -15,7 +15,7 @@ use super::tied_frames::of_frames;
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
-use crate::constants::mujoco::Term;
+use crate::constants::springs::Term;
 use crate::constants::ties::{Lengths, Measure, Tie, TieLaw};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
@@ -50,17 +50,17 @@ impl Stage for Ties {
     const WRITES: &'static [A] = &[A::EfcD, A::EfcAref, A::RowJacobian];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.mujoco.ties.is_empty()
+        !m.ties.is_empty()
     }
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let mut row = m.joint_rows();
         let of_frames = |tie: &Tie<_>| matches!(tie.measure, Measure::Frames(_));
-        if m.mujoco.ties.iter().any(of_frames) {
+        if m.ties.iter().any(of_frames) {
             accelerations_at_rest(cx, m, b, Vec3::zero());
         }
-        for tie in &m.mujoco.ties {
+        for tie in &m.ties {
             let found = measure(cx, m, b, tie);
             write_rows(cx, b, tie, row, &found);
             row += tie.rows;

@@ -14,7 +14,7 @@ use super::tied_frames::{between, carries, placed};
 use super::{BlockOf, ConstantsOf};
 use crate::arrays::Workspace;
 use crate::constants::Constants;
-use crate::constants::actuator::{LengthKind, Sites, TurningLength};
+use crate::constants::actuators::{LengthKind, Sites, TurningLength};
 use crate::lane::{Cx, Num};
 use crate::math::quat;
 use crate::math::spatial::Spatial;

@@ -19,7 +19,7 @@ const WIDER_MAX: usize = 2;
 pub(super) fn merged(m: &Constants<f64>) -> Cow<'_, Constants<f64>> {
     let t = &m.contacts;
     // bodies and impedances of MuJoCo's models are listed by class, and so are rows of torsional friction
-    let is_listed = !m.mujoco.frames.bodies.is_empty() || !m.mujoco.class_impedances.is_empty();
+    let is_listed = !m.outputs.bodies.is_empty() || !m.contacts.impedances.of_classes.is_empty();
     let turns = t.classes.iter().any(|class| class.turns.is_some());
     if is_listed || turns {
         return Cow::Borrowed(m);

@@ -33,13 +33,13 @@ pub(super) enum Rows {
 pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize)> {
     let joints = [Field::JointF, Field::JointTargetQ, Field::JointTargetQd];
     let joints = joints.map(|field| (Input::Field(field), m.dofs.len()));
-    let actuators = m.mujoco.actuators.len();
-    let mocaps = m.mujoco.mocaps;
+    let actuators = m.actuators.all.len();
+    let mocaps = m.mocaps;
     let models = [
         (Field::Ctrl, actuators),
         (Field::MocapPos, 3 * mocaps),
         (Field::MocapQuat, 4 * mocaps),
-        (Field::EqActive, m.mujoco.equalities),
+        (Field::EqActive, m.switches),
     ];
     let models = models.into_iter().filter(|&(_, columns)| columns > 0);
     let models = models.map(|(field, columns)| (Input::Field(field), columns));

@@ -2,7 +2,7 @@
 
 use super::param;
 use crate::arrays::{Block, Workspace};
-use crate::constants::mujoco_frames::MujocoBody;
+use crate::constants::outputs::OutputBody;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Part};
 use crate::lane::Num;
@@ -65,7 +65,7 @@ pub(in crate::step) fn mass<F: Num>(
 pub(in crate::step) fn inertia_times<F: Num, V>(
     m: &Constants<F::Real>,
     b: &Block<F, V>,
-    body: &MujocoBody<F::Real>,
+    body: &OutputBody<F::Real>,
     v: Vec3<F>,
 ) -> Vec3<F> {
     let w: &Workspace<F> = &b.work;

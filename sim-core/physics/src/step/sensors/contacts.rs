@@ -53,7 +53,7 @@ impl Stage for Contacts {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             match &sensor.kind {
                 SensorKind::Touch(touch) => {
                     let sum = touched(cx, m, b, touch);
@@ -118,8 +118,8 @@ fn contact<C: Cx>(
         force: load_vec3(cx, rows, r, row::FORCE),
         torque,
         distance: cx.load(rows, r, row::DISTANCE),
-        order: cx.pick(m.mujoco.sensors.pairs, pair, 0),
-        sense: cx.pick(m.mujoco.sensors.pairs, pair, column),
+        order: cx.pick(m.sensors.pairs, pair, 0),
+        sense: cx.pick(m.sensors.pairs, pair, column),
     }
 }
 

@@ -40,7 +40,7 @@ impl Stage for Accelerations {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         proper_accelerations(cx, m, b);
         let w = &mut b.work;
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let SensorKind::Acceleration(own) = &sensor.kind else {
                 continue;
             };
@@ -82,14 +82,14 @@ impl Stage for Wrenches {
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let SensorKind::Wrench(own) = &sensor.kind else {
                 continue;
             };
             let [x, y, z, u, v, w] = b.work.cfrc_int[own.body];
             let (torque, force) = (Vec3([x, y, z]), Vec3([u, v, w]));
             // the torque about the site
-            let body = &m.mujoco.frames.bodies[own.body];
+            let body = &m.outputs.bodies[own.body];
             let arm = position(&b.work, &own.site) - root_center(m, b, body);
             let vector = if own.is_torque {
                 torque - arm.cross(force)
@@ -131,7 +131,7 @@ impl Stage for Forces {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let scalar = match &sensor.kind {
                 SensorKind::ActuatorForces(actuators) => {
                     let mut sum = C::F::c(0.0);
@@ -194,8 +194,8 @@ fn tie_limit<C: Cx>(
 ) -> C::F {
     let mut value = C::F::c(0.0);
     for &tie in ties.iter().rev() {
-        let row = m.joint_rows() + rows_before(&m.mujoco.ties[..tie]);
-        let tie = &m.mujoco.ties[tie];
+        let row = m.joint_rows() + rows_before(&m.ties[..tie]);
+        let tie = &m.ties[tie];
         let own = match part {
             LimitPart::Position => {
                 let position = measured(cx, m, b, tie);
@@ -263,7 +263,7 @@ impl Stage for Energies {
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let energy = match &sensor.kind {
                 SensorKind::KineticEnergy => b.work.kinetic_energy[0],
                 SensorKind::PotentialEnergy(moment) => {
@@ -285,7 +285,7 @@ impl Stage for Energies {
 #[inline(always)]
 fn static_moment<C: Cx>(m: &ConstantsOf<C>, b: &BlockOf<C>) -> Vec3<C::F> {
     let mut sum = Vec3::zero();
-    let bodies = m.mujoco.frames.bodies.iter();
+    let bodies = m.outputs.bodies.iter();
     for body in bodies.filter(|body| body.frame.body.is_none()) {
         let mass = masses::mass(m, &b.params, body.link, body.mass);
         sum = in_world(&b.work, &body.inertial).scale_add(mass, sum);

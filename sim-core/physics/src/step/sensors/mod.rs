@@ -20,11 +20,7 @@ use crate::lane::{Num, Real};
 
 /// Does the model have a sensor of some kinds?
 fn has<R: Real>(m: &Constants<R>, kinds: impl Fn(&SensorKind<R>) -> bool) -> bool {
-    m.mujoco
-        .sensors
-        .all
-        .iter()
-        .any(|sensor| kinds(&sensor.kind))
+    m.sensors.all.iter().any(|sensor| kinds(&sensor.kind))
 }
 
 /// Writes the scalars of a sensor, in its bounds.

@@ -34,13 +34,13 @@ impl Stage for Rays {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let (zero, none) = (C::F::c(0.0), C::F::c(-1.0));
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let SensorKind::Range(site, geoms) = &sensor.kind else {
                 continue;
             };
             let mut nearest = none;
             for &geom in geoms {
-                let found = seen(&b.work, site, &m.mujoco.sensors.geoms[geom]);
+                let found = seen(&b.work, site, &m.sensors.geoms[geom]);
                 let is_nearer = found.lt(nearest) | nearest.lt(zero);
                 let is_met = !found.lt(zero);
                 nearest = C::F::select(is_met & is_nearer, found, nearest);

@@ -8,9 +8,9 @@
 use super::{has, put};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
-use crate::constants::mujoco::Term;
 use crate::constants::sensors::{FramePart, FrameSensor, SensorKind, SubtreePart};
 use crate::constants::site::Mount;
+use crate::constants::springs::Term;
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{conjugate, mul};
 use crate::math::spatial::{ANGULAR, LINEAR};
@@ -56,7 +56,7 @@ impl Stage for States {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let scalars: &[C::F] = match &sensor.kind {
                 SensorKind::Vector(mount, vector) => {
                     &to_local(&b.work, mount, Vec3::constant(*vector)).0
@@ -172,7 +172,7 @@ impl Stage for Subtrees {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
-        for sensor in &m.mujoco.sensors.all {
+        for sensor in &m.sensors.all {
             let SensorKind::Subtree(body, part) = sensor.kind else {
                 continue;
             };

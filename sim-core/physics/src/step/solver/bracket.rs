@@ -314,8 +314,8 @@ impl<F: Num> Segment<'_, F> {
             let costs = [jar[r], there].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
             sums.add(&one_sided(there, weight[r]), jv, costs);
         }
-        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-            let tie = &m.mujoco.ties[*tie];
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
+            let tie = &m.ties[*tie];
             let Some(&dof) = tie.dofs.first() else {
                 continue;
             };

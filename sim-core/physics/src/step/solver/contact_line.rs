@@ -7,7 +7,7 @@ use super::contacts::{ContactsOf, block_of, law_at};
 use super::islands::is_island;
 use super::turning;
 use crate::constants::contact::{row, turning as more};
-use crate::constants::mujoco::Search;
+use crate::constants::options::Search;
 use crate::lane::{Cx, Num};
 use crate::step::contact_rows::class_list;
 use crate::{each, when};

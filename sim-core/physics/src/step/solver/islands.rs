@@ -10,7 +10,7 @@ use super::contacts;
 use super::rows::Acting;
 use crate::arrays::Workspace;
 use crate::constants::Constants;
-use crate::constants::mujoco::Search;
+use crate::constants::options::Search;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::vec3::Vec3;
 use crate::step::{BlockOf, ConstantsOf};
@@ -44,8 +44,8 @@ pub(super) fn find<C: Cx>(
     for l in acting.runs().flatten() {
         links.add(cx, [m.limits[l].dof], zero.lt(weight[r + l]));
     }
-    for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-        let dofs = m.mujoco.ties[*tie].dofs.iter().copied();
+    for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
+        let dofs = m.ties[*tie].dofs.iter().copied();
         links.add(cx, dofs, zero.lt(weight[r]));
     }
     for (k, class) in m.contacts.classes.iter().enumerate() {

@@ -102,8 +102,8 @@ impl<'a, F: Num> Line<'a, F> {
                 sums.add(one_sided(jar[r], weight[r]), jar[r], jv[r], aref[r]);
             }
         }
-        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-            let law = ties::law(&m.mujoco.ties[*tie].law, jar[r], weight[r]);
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
+            let law = ties::law(&m.ties[*tie].law, jar[r], weight[r]);
             sums.add(law, jar[r], jv[r], aref[r]);
         }
         let Sums {
@@ -182,8 +182,8 @@ impl<'a, F: Num> Line<'a, F> {
                 d.add(alpha, *jv, start, here);
             }
         }
-        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.mujoco.tie_of_row) {
-            let law = &m.mujoco.ties[*tie].law;
+        for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
+            let law = &m.ties[*tie].law;
             let start = ties::law(law, jar[r], weight[r]);
             let here = ties::law(law, alpha.fma(jv[r], jar[r]), weight[r]);
             d.add(alpha, jv[r], start, here);

@@ -419,7 +419,7 @@ fn gather<C: Cx>(cx: &mut C, cells: &[C::V], to: &mut [C::F]) {
 /// solve may start from anywhere. A block of worlds inside their limits then saves the solver, a quarter of its step. `f64` does
 /// not skip: its start is MuJoCo's.
 fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
-    let mut ties = m.mujoco.ties.iter();
+    let mut ties = m.ties.iter();
     let only_limits = m.equalities.is_empty()
         && m.frictions.is_empty()
         && ties.all(|tie| matches!(tie.law, TieLaw::Range(_)));

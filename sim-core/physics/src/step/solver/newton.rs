@@ -14,7 +14,7 @@ use super::contact_line::{self, Own};
 use super::islands::{dot, find, force_norm, is_island, norm, trace};
 use super::rows::{Acting, Jacobian, residual};
 use super::{constraint_forces, minimize_model, model_cost};
-use crate::constants::mujoco::Search;
+use crate::constants::options::Search;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::multiply;
 use crate::step::{BlockOf, ConstantsOf};

@@ -285,7 +285,7 @@ pub(super) fn changes<F: Num>(
         }
     }
     r = m.joint_rows();
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for _ in 0..tie.rows {
             let before = ties::law(&tie.law, jar[r], weight[r]).state;
             let after = ties::law(&tie.law, other[r], weight[r]).state;
@@ -362,7 +362,7 @@ pub(super) fn cost<F: Num>(
         sum = (half * push).fnma(jar[r], sum);
     }
     r = m.joint_rows();
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for _ in 0..tie.rows {
             sum = sum + ties::cost(&tie.law, jar[r], weight[r]);
             r += 1;

@@ -42,7 +42,7 @@ pub(super) fn residual<F: Num>(
     jar: &mut [F],
 ) {
     let mut r = m.joint_rows();
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for row in 0..tie.rows {
             let mut sum = -aref[r];
             for (entry, &dof) in jacobian[tie.jacobian(row)].iter().zip(&tie.dofs) {
@@ -65,7 +65,7 @@ pub(super) fn assemble<F: Num>(
     corrects: Option<F::Mask>,
 ) {
     let mut r = m.joint_rows();
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for row in 0..tie.rows {
             let law = law(&tie.law, jar[r], weight[r]);
             let pull = pull(&law, jar[r], aref[r], corrects);
@@ -93,7 +93,7 @@ pub(super) fn forces<F: Num>(
     joint: &mut [F],
 ) {
     let mut r = m.joint_rows();
-    for tie in &m.mujoco.ties {
+    for tie in &m.ties {
         for row in 0..tie.rows {
             force[r] = law(&tie.law, jar[r], weight[r]).force;
             for (entry, &dof) in jacobian[tie.jacobian(row)].iter().zip(&tie.dofs) {

@@ -1,4 +1,4 @@
-//! Frames of MuJoCo models in MuJoCo's order, model after model: also those that no physics needs.
+//! Frames that outputs are of: those of MuJoCo models in MuJoCo's order, model after model, also where no physics needs them.
 
 use super::recast::{Recast, recast};
 use super::site::Mount;
@@ -6,9 +6,9 @@ use super::site::Mount;
 recast! {
     /// Frames of bodies, sites and geoms; all empty for other models.
     #[derive(Clone, Debug)]
-    pub struct MujocoFrames<R> {
+    pub struct OutputFrames<R> {
         /// Bodies, the world of each model first, parents before children.
-        pub bodies: Vec<MujocoBody<R>>,
+        pub bodies: Vec<OutputBody<R>>,
         /// Sites.
         pub sites: Vec<Mount<R>>,
         /// Geoms, also those that touch nothing.
@@ -16,9 +16,9 @@ recast! {
     }
 }
 
-impl<R> Default for MujocoFrames<R> {
-    fn default() -> MujocoFrames<R> {
-        MujocoFrames {
+impl<R> Default for OutputFrames<R> {
+    fn default() -> OutputFrames<R> {
+        OutputFrames {
             bodies: Vec::new(),
             sites: Vec::new(),
             geoms: Vec::new(),
@@ -29,7 +29,7 @@ impl<R> Default for MujocoFrames<R> {
 recast! {
     /// A body of a MuJoCo model.
     #[derive(Clone, Debug)]
-    pub struct MujocoBody<R> {
+    pub struct OutputBody<R> {
         /// Its index among the links.
         pub link: usize,
         /// Its parent in this list; a world's is itself.

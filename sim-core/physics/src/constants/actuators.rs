@@ -1,8 +1,78 @@
-//! What actuators of MuJoCo models have beyond a linear law: activations, and lengths whose moments are found at run time.
+//! Actuators: forces along lengths that a control and an activation drive.
 
 use super::recast::{Recast, recast};
 use super::site::Mount;
+use super::springs::Term;
 use crate::lane::Real;
+
+recast! {
+    /// Actuators, and bounds of their sums; none where only drives move a model.
+    #[derive(Clone, Debug)]
+    pub struct Actuators<R> {
+        /// Actuators.
+        pub all: Vec<Actuator<R>>,
+        /// How many of them have an activation.
+        pub activations: usize,
+        /// Bounds of the sum of actuator forces on a dof.
+        pub dof_bounds: Vec<ActuatorBound<R>>,
+        /// Bounds of the sum of actuator forces along a tendon.
+        pub tendon_bounds: Vec<TendonBound<R>>,
+    }
+}
+
+impl<R> Default for Actuators<R> {
+    fn default() -> Actuators<R> {
+        Actuators {
+            all: Vec::new(),
+            activations: 0,
+            dof_bounds: Vec::new(),
+            tendon_bounds: Vec::new(),
+        }
+    }
+}
+
+recast! {
+    /// An actuator: a force along a length (MuJoCo: `actuator/general`).
+    #[derive(Clone, Debug)]
+    pub struct Actuator<R> {
+        /// Its length is the sum of these coordinates times their coefficients, gear included.
+        pub terms: Vec<Term<R>>,
+        /// In place of that, a length whose moments are found at run time.
+        pub turning: Option<TurningLength<R>>,
+        /// What its control drives, if that is not its force.
+        pub activation: Option<Activation<R>>,
+        /// Bounds of its control, if it has any.
+        pub ctrl_range: Option<[R; 2]>,
+        /// Bounds of its force, if it has any [N or N·m].
+        pub force_range: Option<[R; 2]>,
+        /// What the control or the activation is multiplied with: a constant, and factors of length and velocity.
+        pub gain: [R; 3],
+        /// What is added to it: a constant, and factors of length and velocity.
+        pub bias: [R; 3],
+    }
+}
+
+recast! {
+    /// Bounds of the sum of actuator forces on a dof (MuJoCo: `actuatorfrcrange`).
+    #[derive(Clone, Debug)]
+    pub struct ActuatorBound<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [N·m or N]
+        pub range: [R; 2],
+    }
+}
+
+recast! {
+    /// Bounds of the sum of actuator forces along a tendon (MuJoCo: `tendon/fixed/actuatorfrcrange`).
+    #[derive(Clone, Debug)]
+    pub struct TendonBound<R> {
+        /// Places of its actuators.
+        pub actuators: Vec<usize>,
+        /// [N or N·m]
+        pub range: [R; 2],
+    }
+}
 
 recast! {
     /// The state of an actuator (MuJoCo: `actuator_dyntype`).

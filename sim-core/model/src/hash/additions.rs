@@ -1,19 +1,147 @@
-//! What models from MuJoCo have: springs, actuators, ties, frames.
+//! What the text has under the key `mujoco`, after all else: springs, actuators, ties, frames of outputs.
+//!
+//! The first release kept these constants together, for models from MuJoCo alone.
 
-use sim_physics::constants::actuator::{
-    Activation, ActivationRate, LengthKind, Sites, TurningLength,
+use sim_physics::constants::actuators::{
+    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, LengthKind, Sites, TendonBound,
+    TurningLength,
 };
-use sim_physics::constants::mujoco::{
-    Actuator, ActuatorBound, Compensation, Drag, Integrator, Mujoco, PoseSpring, Search, Spring,
-    Tendon, TendonBound, Term,
-};
-use sim_physics::constants::mujoco_frames::{MujocoBody, MujocoFrames};
+use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
+use sim_physics::constants::options::{Integrator, Search};
+use sim_physics::constants::outputs::{OutputBody, OutputFrames};
+use sim_physics::constants::passive::{Compensation, Drag, GravityCompensation};
+use sim_physics::constants::sensors::Sensors;
+use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon, Term};
 use sim_physics::constants::ties::{Frames, Lengths, Measure, Tie, TieLaw};
+
+use sim_physics::constants::{Constants, Impedance};
+use sim_physics::lane::Fixed;
 
 use super::text::{Text, View, When, view, words};
 
+/// Constants of the second group.
+pub(super) struct Additions<'a> {
+    integrator: Integrator,
+    springs: &'a Vec<Spring<f64>>,
+    pose_springs: &'a Vec<PoseSpring<f64>>,
+    free_joints: &'a Vec<usize>,
+    drags: &'a Vec<Drag<f64>>,
+    compensations: &'a Vec<Compensation<f64>>,
+    passive_dofs: &'a Vec<usize>,
+    actuated_dofs: &'a Vec<usize>,
+    tendons: &'a Vec<Tendon<f64>>,
+    ties: &'a Vec<Tie<f64>>,
+    tie_of_row: &'a Vec<usize>,
+    switches: usize,
+    actuators: &'a Vec<Actuator<f64>>,
+    activations: usize,
+    mocaps: usize,
+    dof_bounds: &'a Vec<ActuatorBound<f64>>,
+    tendon_bounds: &'a Vec<TendonBound<f64>>,
+    impedances: &'a Vec<Impedance<f64>>,
+    pair_impedance: &'a Fixed,
+    class_impedances: &'a Vec<Vec<usize>>,
+    outputs: &'a OutputFrames<f64>,
+    sensors: &'a Sensors<f64>,
+    pair_bodies: &'a Fixed,
+    class_bodies: &'a Vec<Vec<usize>>,
+}
+
+impl Additions<'_> {
+    /// Those of a model. A field that is missing here and in the first group is a compile error.
+    pub(super) fn of(constants: &Constants<f64>) -> Additions<'_> {
+        let Constants {
+            dt: _,
+            gravity: _,
+            bodies: _,
+            dofs: _,
+            trees: _,
+            frames: _,
+            damped: _,
+            mass_entries: _,
+            mass_zeros: _,
+            coords: _,
+            equalities: _,
+            frictions: _,
+            limits: _,
+            pattern: _,
+            coupled: _,
+            contacts,
+            contact_impedance: _,
+            solver: _,
+            varying: _,
+            delay: _,
+            sites: _,
+            scans: _,
+            integrator,
+            springs:
+                Springs {
+                    joints,
+                    poses,
+                    tendons,
+                },
+            free_joints,
+            drags,
+            compensation:
+                GravityCompensation {
+                    links,
+                    passive_dofs,
+                    actuated_dofs,
+                },
+            ties,
+            tie_of_row,
+            switches,
+            actuators:
+                Actuators {
+                    all,
+                    activations,
+                    dof_bounds,
+                    tendon_bounds,
+                },
+            mocaps,
+            outputs,
+            sensors,
+        } = constants;
+        let PairImpedances {
+            all: impedances,
+            of_pair: pair_impedance,
+            of_classes: class_impedances,
+        } = &contacts.impedances;
+        let TouchedBodies {
+            of_pair: pair_bodies,
+            of_classes: class_bodies,
+        } = &contacts.bodies;
+        Additions {
+            integrator: *integrator,
+            springs: joints,
+            pose_springs: poses,
+            free_joints,
+            drags,
+            compensations: links,
+            passive_dofs,
+            actuated_dofs,
+            tendons,
+            ties,
+            tie_of_row,
+            switches: *switches,
+            actuators: all,
+            activations: *activations,
+            mocaps: *mocaps,
+            dof_bounds,
+            tendon_bounds,
+            impedances,
+            pair_impedance,
+            class_impedances,
+            outputs,
+            sensors,
+            pair_bodies,
+            class_bodies,
+        }
+    }
+}
+
 view! {
-    Mujoco<f64> as "Mujoco":
+    Additions<'_> as "Mujoco":
         Always {
             "integrator": integrator,
             "springs": springs,
@@ -21,26 +149,25 @@ view! {
             "free_joints": free_joints,
             "drags": drags,
             "compensations": compensations,
-            "compensated": compensated,
-            "compensated_by_actuators": compensated_by_actuators,
+            "compensated": passive_dofs,
+            "compensated_by_actuators": actuated_dofs,
             "tendons": tendons,
             "ties": ties,
             "tie_of_row": tie_of_row,
-            "equalities": equalities,
+            "equalities": switches,
             "actuators": actuators,
             "activations": activations,
             "mocaps": mocaps,
-            "actuator_bounds": actuator_bounds,
+            "actuator_bounds": dof_bounds,
             "tendon_bounds": tendon_bounds,
             "impedances": impedances,
             "pair_impedance": pair_impedance,
             "class_impedances": class_impedances,
-            "frames": frames,
+            "frames": outputs,
             "sensors": sensors,
             "pair_bodies": pair_bodies,
             "class_bodies": class_bodies,
-        }
-        Never { "search": search };
+        };
     Spring<f64> as "Spring":
         Always { "dof": dof, "stiffness": stiffness, "rest": rest };
     PoseSpring<f64> as "PoseSpring":
@@ -106,9 +233,9 @@ view! {
             "torque_scale": torque_scale,
             "bodies": bodies,
         };
-    MujocoFrames<f64> as "MujocoFrames":
+    OutputFrames<f64> as "MujocoFrames":
         Always { "bodies": bodies, "sites": sites, "geoms": geoms };
-    MujocoBody<f64> as "MujocoBody":
+    OutputBody<f64> as "MujocoBody":
         Always {
             "link": link,
             "parent": parent,

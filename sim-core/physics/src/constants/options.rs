@@ -1,0 +1,71 @@
+//! Options of a step: how it integrates, and how its solver iterates.
+
+use super::recast::{Recast, recast, same};
+use std::ops::Range;
+
+/// How a step integrates velocities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrator {
+    /// Implicit in damping of joints, drives and actuators, and in the gyroscopic force of free bodies.
+    #[default]
+    ImplicitFast,
+    /// Implicit in the damping of joints and drives alone.
+    Euler,
+    /// Runge-Kutta of fourth order.
+    RungeKutta,
+}
+
+recast! {
+    /// Options of the constraint solver.
+    #[derive(Clone, Debug)]
+    pub struct Newton<R> {
+        /// Most iterations.
+        pub iterations: usize,
+        /// Most line-search evaluations per iteration.
+        pub ls_iterations: usize,
+        /// Improvement of the cost below which the solver stops: the option × mean inertia × dofs.
+        pub tolerance: R,
+        /// Corrections of the accelerations in `f32` (`step/solver/refine.rs`).
+        pub refinements: usize,
+        /// How the solver ends its iterations and line searches in `f64`, for models from MuJoCo.
+        pub search: Option<Search<R>>,
+    }
+}
+
+recast! {
+    /// Options of MuJoCo's solver, and the parts that it may solve one by one.
+    #[derive(Clone, Debug)]
+    pub struct Search<R> {
+        /// Improvement, gradient and expected gain below which an island ends, over the trace of its mass matrix.
+        pub tolerance: R,
+        /// Share of the tolerance to which a line is searched.
+        pub ls_tolerance: R,
+        /// Whether trees that no constraint couples are solved one by one.
+        pub islands: bool,
+        /// Whether the last step's accelerations may be the start.
+        pub warm_start: bool,
+        /// Of each dof, the first one of its kinematic tree.
+        pub roots: Vec<usize>,
+        /// Of each such first dof, the classes of contacts that its tree is the first of; empty for other dofs.
+        pub classes: Vec<Vec<usize>>,
+    }
+}
+
+impl<R> Search<R> {
+    /// The first dofs of trees, after which islands are named.
+    pub fn islands_of(&self, dofs: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..dofs).filter(|&dof| self.roots[dof] == dof)
+    }
+
+    /// Runs of dofs that are of one tree.
+    pub fn segments(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let mut end = 0;
+        self.roots.chunk_by(|a, b| a == b).map(move |run| {
+            let start = end;
+            end += run.len();
+            start..end
+        })
+    }
+}
+
+same! { Integrator }

@@ -1,0 +1,80 @@
+//! Springs and dampers of joints and tendons.
+
+use super::recast::{Recast, recast};
+
+recast! {
+    /// Springs; none where a model has none.
+    #[derive(Clone, Debug)]
+    pub struct Springs<R> {
+        /// Of joints with one coordinate.
+        pub joints: Vec<Spring<R>>,
+        /// Of balls and free joints.
+        pub poses: Vec<PoseSpring<R>>,
+        /// Springs and dampers of tendons.
+        pub tendons: Vec<Tendon<R>>,
+    }
+}
+
+impl<R> Default for Springs<R> {
+    fn default() -> Springs<R> {
+        Springs {
+            joints: Vec::new(),
+            poses: Vec::new(),
+            tendons: Vec::new(),
+        }
+    }
+}
+
+recast! {
+    /// A spring of a dof with one coordinate: the force is -stiffness (q - rest).
+    #[derive(Clone, Debug)]
+    pub struct Spring<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [N·m/rad or N/m]
+        pub stiffness: R,
+        /// Position without force [rad or m].
+        pub rest: R,
+    }
+}
+
+recast! {
+    /// A spring of a ball or a free joint: forces along the axes of its position, and a torque along its rotation vector.
+    #[derive(Clone, Debug)]
+    pub struct PoseSpring<R> {
+        /// The body of the joint.
+        pub body: usize,
+        /// Of its position [N/m] and of its rotation [N·m/rad].
+        pub stiffness: R,
+        /// Position without force of a free joint, in the world [m].
+        pub position: [R; 3],
+        /// Rotation without torque, (x, y, z, w) [–].
+        pub quat: [R; 4],
+    }
+}
+
+recast! {
+    /// A fixed tendon that acts as a spring and a damper: its length is the sum of coordinates times coefficients.
+    #[derive(Clone, Debug)]
+    pub struct Tendon<R> {
+        /// The terms of its length.
+        pub terms: Vec<Term<R>>,
+        /// [N/m or N·m/rad]
+        pub stiffness: R,
+        /// Lengths between which its spring has no force [m or rad].
+        pub rest: [R; 2],
+        /// [N·s/m or N·m·s/rad]
+        pub damping: R,
+    }
+}
+
+recast! {
+    /// A dof with one coordinate, and a factor.
+    #[derive(Clone, Debug)]
+    pub struct Term<R> {
+        /// The dof.
+        pub dof: usize,
+        /// [–]
+        pub coefficient: R,
+    }
+}
