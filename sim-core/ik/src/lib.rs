@@ -1,6 +1,6 @@
 //! Inverse kinematics of a model: joint positions at which frames reach their targets.
 //!
-//! Levenberg-Marquardt in registers of many problems, one per lane, over the kinematics of [`sim_physics::step::kinematics`].
+//! Levenberg-Marquardt in registers of many problems, one per lane, over the kinematics of [`sim_physics::step::tree::kinematics`].
 //! A problem that ends leaves its lane to the next one.
 //!
 //! Imports run one way: `error ← task ← frames ← random ← rotation ← followers ← plan ← tables ← measure ← step ← lanes ← check ← starts

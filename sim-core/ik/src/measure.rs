@@ -16,8 +16,8 @@ use sim_physics::lane::memory::Cpu;
 use sim_physics::lane::{Lane, Num};
 use sim_physics::math::spatial::Spatial;
 use sim_physics::math::vec3::{Mat3, Vec3};
-use sim_physics::step::kinematics::{place_bases, place_body};
-use sim_physics::step::sites;
+use sim_physics::step::outputs::sites;
+use sim_physics::step::tree::kinematics::{place_bases, place_body};
 
 /// The target of a frame in each lane.
 #[derive(Clone, Copy)]

@@ -120,14 +120,15 @@ impl Commands {
 fn channels(model: &Model, start: Option<&KeyState>) -> (Field, Vec<Channel>) {
     let m = model.constants();
     if !m.actuators.all.is_empty() {
-        let channel = |(k, actuator): (usize, &sim_physics::constants::actuators::Actuator<f64>)| {
-            let [low, high] = actuator.ctrl_range.unwrap_or([-HALF_RANGE, HALF_RANGE]);
-            Channel {
-                middle: start.map_or((low + high) / 2.0, |key| key.ctrl[k]),
-                low,
-                high,
-            }
-        };
+        let channel =
+            |(k, actuator): (usize, &sim_physics::constants::actuators::Actuator<f64>)| {
+                let [low, high] = actuator.ctrl_range.unwrap_or([-HALF_RANGE, HALF_RANGE]);
+                Channel {
+                    middle: start.map_or((low + high) / 2.0, |key| key.ctrl[k]),
+                    low,
+                    high,
+                }
+            };
         let actuators = m.actuators.all.iter().enumerate();
         return (Field::Ctrl, actuators.map(channel).collect());
     }

@@ -4,7 +4,8 @@ use sim_physics::arrays::{Field, Flat, Source, Workspace};
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Cx, Num};
 use sim_physics::math::spatial::Spatial;
-use sim_physics::step::{BlockOf, ConstantsOf, mujoco_state};
+use sim_physics::step::tree::generalized;
+use sim_physics::step::{BlockOf, ConstantsOf};
 
 /// Gathers a field that is neither of contacts nor a counter, one number per element.
 #[inline(always)]
@@ -24,14 +25,14 @@ pub(super) fn gather<C: Cx>(
         _ => match field {
             Field::MassMatrix => mass_matrix(m, w, to),
             Field::Qpos => qpos(cx, m, b, to),
-            Field::Qvel => mujoco_state::velocities(cx, m, b, to),
-            Field::Qacc => mujoco_state::accelerations(cx, m, b, to),
+            Field::Qvel => generalized::velocities(cx, m, b, to),
+            Field::Qacc => generalized::accelerations(cx, m, b, to),
             Field::QfrcActuator => joint_forces(m, w, &w.qfrc_actuator, to),
             Field::QfrcPassive => joint_forces(m, w, &w.passive_force, to),
-            Field::QfrcBias => mujoco_state::bias(cx, m, b, to),
+            Field::QfrcBias => generalized::bias(cx, m, b, to),
             Field::QfrcConstraint => {
                 copy_cells(cx, &b.constraint_force, to);
-                mujoco_state::turn_forces(m, w, to);
+                generalized::turn_forces(m, w, to);
             }
             Field::BodyJacobian => body_jacobian(m, w, to),
             Field::SiteInverseJacobian => inverse_jacobian(m, w, to),
@@ -65,7 +66,7 @@ fn joint_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, from: &[F], to
         to.fill(F::c(0.0));
     } else {
         to.copy_from_slice(from);
-        mujoco_state::turn_forces(m, w, to);
+        generalized::turn_forces(m, w, to);
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) struct Reference {
     pub locked_over_free: f64,
 }
 
-/// M = Σ over bodies of Jᵀ I J, from its definition: the recursion of `step/mass_matrix.rs` is
+/// M = Σ over bodies of Jᵀ I J, from its definition: the recursion of `step/tree/mass_matrix.rs` is
 /// checked against MuJoCo, and this one against both.
 pub(super) fn at_reference(
     constants: &Constants<f64>,

@@ -10,45 +10,18 @@
 //!
 //! | Pairs | Method | File |
 //! |---|---|---|
-//! | plane, sphere, capsule | closed form | `planes`, `spheres`, `capsules` |
-//! | plane and hull | the deepest vertex, with corners of a polygon beside it or others | `plane_hull` |
-//! | capsule and box, of models from MuJoCo | MuJoCo's choice of features | `capsule_box` |
-//! | box and box | separating axes, clipping | `boxes`, `box_faces` |
-//! | with a cylinder or a hull | [`convex`]: axes, GJK, clipping | `cylinders`, `hulls` |
-//! | height field | a convex prism below each of its triangles | `fields`, `field_samples`, `prisms`, `prism_hull` |
+//! | plane, sphere, capsule | closed form | `primitive/{planes,spheres,capsules}` |
+//! | plane and hull | the deepest vertex, with corners of a polygon beside it or others | `convex/plane_hull` |
+//! | capsule and box, of models from MuJoCo | MuJoCo's choice of features | `primitive/capsule_box` |
+//! | box and box | separating axes, clipping | `primitive/{boxes,box_faces}` |
+//! | with a cylinder or a hull | [`convex::pairs`]: axes, GJK, clipping | `primitive/cylinders`, `convex/hulls` |
+//! | height field | a convex prism below each of its triangles | `height_field`, `convex/{prisms,prism_hull}` |
 
-mod box_faces;
-mod boxes;
-mod capsule_box;
-mod capsules;
-mod clip;
 mod convex;
-mod cylinders;
-mod features;
-mod field_samples;
-mod fields;
-mod gjk;
-mod hull;
-mod hull_axes;
-mod hull_depth;
-mod hulls;
+mod height_field;
 mod manifold;
 mod narrow;
-mod plane_hull;
-mod planes;
-mod points;
-mod posed;
-mod prism;
-mod prism_axes;
-mod prism_hull;
-mod prisms;
-mod reduction;
-mod restart;
-mod select;
-mod simplex;
-mod spheres;
-mod start_axes;
-mod support;
+mod primitive;
 mod variables;
 
 use super::{BlockOf, ConstantsOf, Stage};
@@ -63,10 +36,10 @@ use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
-pub(super) use field_samples::Samples;
-pub use fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
+pub(super) use height_field::field_samples::Samples;
+pub use height_field::fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
+use manifold::points::{Points, Room};
 pub use narrow::*;
-use points::{Points, Room};
 
 /// Poses of shapes.
 pub struct Place;

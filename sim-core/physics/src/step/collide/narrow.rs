@@ -1,8 +1,10 @@
 //! The narrow phase: one stage for each pair of shape kinds, and the function that finds its contacts.
 
-use super::hull::Hull;
-use super::points::Points;
-use super::{boxes, capsules, collide_group, cylinders, hulls, plane_hull, planes, spheres};
+use super::collide_group;
+use super::convex::hull::Hull;
+use super::convex::{hulls, plane_hull};
+use super::manifold::points::Points;
+use super::primitive::{boxes, capsules, cylinders, planes, spheres};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::clip::Cut;

@@ -7,7 +7,7 @@ use crate::constants::params::Param;
 use crate::constants::{Constants, Part};
 use crate::lane::Num;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::sites::axes;
+use crate::step::outputs::sites::axes;
 
 /// Do masses or inertias of links vary?
 #[inline(always)]

@@ -6,7 +6,7 @@ use super::turning;
 use crate::constants::contact::{Run, row, turning as more};
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num};
-use crate::step::contact_rows::class_list;
+use crate::step::constraints::contact_rows::class_list;
 
 /// Adds Jᵀ W J of a class to `hessian`, and Jᵀ f to `rhs` if `pulls`. Writes the pieces that its contacts are on in the model.
 #[inline(always)]

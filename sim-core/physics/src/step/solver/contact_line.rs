@@ -9,7 +9,7 @@ use super::turning;
 use crate::constants::contact::{row, turning as more};
 use crate::constants::options::Search;
 use crate::lane::{Cx, Num};
-use crate::step::contact_rows::class_list;
+use crate::step::constraints::contact_rows::class_list;
 use crate::{each, when};
 
 /// An island, by the island of each dof.

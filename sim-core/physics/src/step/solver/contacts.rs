@@ -11,7 +11,7 @@ use crate::constants::contact::Cone;
 use crate::constants::contact::{Class, Contacts, row, turning as more};
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::step::contact_rows::class_list;
+use crate::step::constraints::contact_rows::class_list;
 
 /// Values in the active worlds, 0 elsewhere.
 #[inline(always)]

@@ -4,7 +4,6 @@
 //! its accelerations are M⁻¹ τ. MuJoCo measures an island by the trace of its mass matrix (`mj_island`; the measure is found
 //! by experiment with MuJoCo 3.17).
 
-use super::super::mujoco_state::{free_bodies, halves};
 use super::contact_line::Own;
 use super::contacts;
 use super::rows::Acting;
@@ -13,6 +12,7 @@ use crate::constants::Constants;
 use crate::constants::options::Search;
 use crate::lane::{Cx, MaskOf, Num};
 use crate::math::vec3::Vec3;
+use crate::step::tree::generalized::{free_bodies, halves};
 use crate::step::{BlockOf, ConstantsOf};
 
 /// Writes the island of each dof.

@@ -1,6 +1,5 @@
 //! The cost along a segment, and its exact minimum.
 
-use super::super::ConstantsOf;
 use super::contacts::{self, LineStart};
 use super::own_rows::OwnRow;
 use super::rows::{Acting, Law, bounds, dry_friction, equality, one_sided};
@@ -8,6 +7,7 @@ use super::ties;
 use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
+use crate::step::ConstantsOf;
 use crate::{break_if, times};
 
 /// The cost p along the segment from `a` (α = 0) to the minimum of its quadratic model (α = 1).

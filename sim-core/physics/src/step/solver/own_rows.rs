@@ -1,9 +1,9 @@
 //! Rows of joints of a line search where several lanes share a world: each lane has its own.
 
-use super::super::ConstantsOf;
 use super::rows::{Law, bounds, dry_friction, equality, one_sided};
 use crate::arrays::Workspace;
 use crate::lane::{Cx, Num};
+use crate::step::ConstantsOf;
 
 /// A row of each lane of a world: of dry friction, or of a limit. A lane without one has a row that adds nothing.
 pub(super) struct OwnRow<F> {

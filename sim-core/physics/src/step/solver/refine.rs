@@ -15,7 +15,7 @@ use super::{acts, constraint_forces, contacts, gather, may_idle};
 use crate::arrays::Array as A;
 use crate::constants::contact::row;
 use crate::lane::{Cx, Num, Real};
-use crate::step::inverse_dynamics::inverse_dynamics;
+use crate::step::tree::inverse_dynamics::inverse_dynamics;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 use crate::when;
 

@@ -3,12 +3,12 @@
 //! A row has a cost s of its residual jar = J a - aref, piecewise quadratic: force -s', stiffness s''. Rows are in MuJoCo's
 //! order: equalities, frictions, limits. J has one or two entries per row, so no row is stored. Rows of ties follow.
 
+use super::ties;
 use crate::arrays::Workspace;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Friction};
 use crate::lane::{Cx, Num};
 use crate::step::param;
-use crate::step::solver::ties;
 use std::ops::Range;
 
 /// What is known of J at run time only.

@@ -11,7 +11,7 @@ use crate::constants::contact::row;
 use crate::each;
 use crate::lane::{Cx, Num};
 use crate::math::factor::inverse;
-use crate::step::contact_rows::class_list;
+use crate::step::constraints::contact_rows::class_list;
 
 /// Most dofs of a system that is spread: its columns are kept in registers.
 const DOFS_MAX: usize = 48;

@@ -1,11 +1,11 @@
 //! Where the solver starts in `f64` (MuJoCo: `mj_warmstart`).
 
-use super::super::mujoco_state::take_accelerations;
 use super::contacts;
 use super::rows::{Acting, Jacobian, cost, residual};
 use crate::constants::contact::row;
 use crate::lane::{Cx, Num};
 use crate::math::factor::{multiply, solve as solve_linear};
+use crate::step::tree::generalized::take_accelerations;
 use crate::step::{BlockOf, ConstantsOf};
 
 /// Starts from M⁻¹ τ where that costs less than the last step's result.

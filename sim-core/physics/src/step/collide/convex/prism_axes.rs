@@ -1,0 +1,366 @@
+//! Separating axes of a prism of a height field and another shape, in the axes of that shape, where its reach is a closed form and
+//! an edge's normal to one of its own axes has two components.
+
+use super::hull_axes::{Reach, SeparatingAxis};
+use super::prism::Prism;
+use crate::lane::Num;
+use crate::math::vec3::{Mat3, Vec3};
+use crate::step::collide::manifold::select::{column_at, select, transpose};
+
+/// Squared sine below which an edge lies along an axis of the other shape: their common normal is that of a face.
+const ALONG: f64 = 1e-6;
+
+/// How far the other shape reaches along the normals of a prism's sides, which are those of all prisms.
+pub struct FieldReach<F> {
+    /// Along x, y and z of the field [m].
+    pub half: Vec3<F>,
+    /// Across the diagonals of cells [m].
+    pub across: F,
+}
+
+/// The best separating axis of a prism and another shape, and the features it belongs to.
+pub(in crate::step::collide) struct PrismAxis<F> {
+    /// The best that may be the way out, from the other shape to the prism.
+    pub axis: SeparatingAxis<F>,
+    /// The distance along the best of all axes [m].
+    pub gap: F,
+    /// 0: normal of a face of the prism; 1: of a face of the other; 2: of two edges.
+    pub kind: F,
+    /// A point of the prism's edge, and its unit direction.
+    pub edge: [Vec3<F>; 2],
+    /// Unit direction of the other's edge.
+    pub other: Vec3<F>,
+}
+
+/// A prism in the axes of another shape, from the centre of that shape.
+struct OwnPrism<F> {
+    /// Corners of the top, and those below them.
+    top: [Vec3<F>; 3],
+    bottom: [Vec3<F>; 3],
+    /// Normal of the top.
+    up: Vec3<F>,
+    /// Axes of the field.
+    field: [Vec3<F>; 3],
+}
+
+/// The best axis so far.
+struct Search<F> {
+    normal: Vec3<F>,
+    distance: F,
+    gap: F,
+    /// 0: the prism's top; 1: its sides and bottom; 2: the other's faces; from 3 on: edges, four for each axis of the other.
+    code: F,
+}
+
+/// What an axis must exceed to be taken.
+#[derive(Clone, Copy)]
+struct Limits<F> {
+    tolerance: F,
+    /// Least cosine of a normal to that of the top; any if negative.
+    facing: f64,
+}
+
+impl<F: Num> Search<F> {
+    /// Takes the axis n or -n if it is better by the tolerance and faces the top enough. The prism reaches from `low` to `high`
+    /// along n, the other shape half as far as said to either side; `rise` is the cosine of n to the normal of the top.
+    #[inline(always)]
+    fn offer(
+        &mut self,
+        n: Vec3<F>,
+        [low, high]: [F; 2],
+        half: F,
+        rise: F,
+        limits: Limits<F>,
+        code: f64,
+    ) {
+        let (along, against) = (low - half, -high - half);
+        self.gap = self.gap.max(along).max(against);
+        let any = limits.facing < 0.0;
+        let turned = match any {
+            true => along.lt(against),
+            false => F::c(0.0).lt(rise),
+        };
+        let distance = F::select(turned, against, along);
+        let mut is = (self.distance + limits.tolerance).lt(distance);
+        if !any {
+            is = is & F::c(limits.facing).lt(rise.abs());
+        }
+        self.normal = select(is, select(turned, -n, n), self.normal);
+        self.distance = F::select(is, distance, self.distance);
+        self.code = F::select(is, F::c(code), self.code);
+    }
+
+    /// As [`Search::offer`] for the common normal of two edges.
+    #[inline(always)]
+    fn offer_common<R: Reach<F>>(
+        &mut self,
+        of: &Common<F>,
+        up: Vec3<F>,
+        other: &R,
+        limits: Limits<F>,
+        code: f64,
+    ) {
+        // of parallel ones the normal is that of a face
+        let far = F::c(1e18);
+        let low = F::select(of.parallel, -far, of.span[0]);
+        let high = F::select(of.parallel, far, of.span[1]);
+        let (n, half) = (of.normal, other.reach(of.normal));
+        self.offer(n, [low, high], half, n.dot(up), limits, code);
+    }
+
+    /// As [`Search::offer`] for the outward normal of a face of the prism that is this far from the other shape.
+    #[inline(always)]
+    fn offer_face(&mut self, n: Vec3<F>, distance: F, rise: F, limits: Limits<F>) {
+        self.gap = self.gap.max(distance);
+        let is = (self.distance + limits.tolerance).lt(distance) & F::c(limits.facing).lt(rise);
+        self.normal = select(is, -n, self.normal);
+        self.distance = F::select(is, distance, self.distance);
+        self.code = F::select(is, F::c(1.0), self.code);
+    }
+}
+
+impl<F: Num> OwnPrism<F> {
+    #[inline(always)]
+    fn new(prism: &Prism<F>, axes: &Mat3<F>) -> OwnPrism<F> {
+        let Mat3(field) = transpose(axes);
+        let (mut top, mut bottom) = (prism.top, prism.top);
+        for i in 0..3 {
+            let height = prism.bottom - prism.top[i][2];
+            top[i] = axes.transpose_mul(prism.top[i]);
+            bottom[i] = field[2].scale_add(height, top[i]);
+        }
+        OwnPrism {
+            top,
+            bottom,
+            up: axes.transpose_mul(prism.up),
+            field,
+        }
+    }
+
+    /// Its least and greatest reach along one of the other's axes.
+    #[inline(always)]
+    fn span(&self, j: usize) -> [F; 2] {
+        let [a, b, c] = self.top;
+        let [p, q, r] = self.bottom;
+        let low = a[j].min(b[j]).min(c[j]).min(p[j].min(q[j]).min(r[j]));
+        let high = a[j].max(b[j]).max(c[j]).max(p[j].max(q[j]).max(r[j]));
+        [low, high]
+    }
+
+    /// Edges of its top, then the way down, each with its squared length.
+    #[inline(always)]
+    fn edges(&self) -> [(Vec3<F>, F); 4] {
+        let [p, q, k] = self.top;
+        let (pq, qk, kp) = (q - p, k - q, p - k);
+        [
+            (pq, pq.dot(pq)),
+            (qk, qk.dot(qk)),
+            (kp, kp.dot(kp)),
+            (-self.field[2], F::c(1.0)),
+        ]
+    }
+
+    /// The common normal of edge `I` and axis `J` of the other shape. A loop over both is not unrolled.
+    #[inline(always)]
+    fn across<const I: usize, const J: usize>(&self, (edge, length): (Vec3<F>, F)) -> Common<F> {
+        let (k, l) = ((J + 1) % 3, (J + 2) % 3);
+        let (x, y) = (edge[l], -edge[k]);
+        let square = x.fma(x, y * y);
+        let least = length * F::c(ALONG);
+        let unit = F::c(1.0).div(square.max(least).sqrt());
+        // both ends of an edge of the top are as far, and so is what lies below a corner across an upright edge
+        let (a, b) = (self.top[I % 3], self.top[(I + 2) % 3]);
+        let (a, b) = (x.fma(a[k], y * a[l]), x.fma(b[k], y * b[l]));
+        let (mut low, mut high) = (a.min(b), a.max(b));
+        if I < 3 {
+            let [p, q, r] = self.bottom;
+            let (p, q) = (x.fma(p[k], y * p[l]), x.fma(q[k], y * q[l]));
+            let r = x.fma(r[k], y * r[l]);
+            low = low.min(p).min(q.min(r));
+            high = high.max(p).max(q.max(r));
+        } else {
+            let c = self.top[1];
+            let c = x.fma(c[k], y * c[l]);
+            (low, high) = (low.min(c), high.max(c));
+        }
+        let mut normal = [F::c(0.0); 3];
+        normal[k] = x * unit;
+        normal[l] = y * unit;
+        Common {
+            normal: Vec3(normal),
+            span: [low * unit, high * unit],
+            parallel: square.lt(least),
+        }
+    }
+
+    /// The larger of `gap` and the distance along the common normals of all edges and axis `J` of the other shape.
+    #[inline(always)]
+    fn gap_across<const J: usize, R: Reach<F>>(&self, other: &R, radius: F, gap: F) -> F {
+        let [pq, qk, kp, down] = self.edges();
+        let gap = gap.max(self.across::<0, J>(pq).gap(other, radius));
+        let gap = gap.max(self.across::<1, J>(qk).gap(other, radius));
+        let gap = gap.max(self.across::<2, J>(kp).gap(other, radius));
+        gap.max(self.across::<3, J>(down).gap(other, radius))
+    }
+
+    /// Offers the common normals of all edges and axis `J` of the other shape.
+    #[inline(always)]
+    fn offer_across<const J: usize, R: Reach<F>>(
+        &self,
+        other: &R,
+        limits: Limits<F>,
+        best: &mut Search<F>,
+    ) {
+        // the edges below its corners are parallel: one axis for all three
+        let [pq, qk, kp, down] = self.edges();
+        let code = (3 + 4 * J) as f64;
+        best.offer_common(&self.across::<0, J>(pq), self.up, other, limits, code);
+        best.offer_common(&self.across::<1, J>(qk), self.up, other, limits, code + 1.0);
+        best.offer_common(&self.across::<2, J>(kp), self.up, other, limits, code + 2.0);
+        best.offer_common(
+            &self.across::<3, J>(down),
+            self.up,
+            other,
+            limits,
+            code + 3.0,
+        );
+    }
+}
+
+/// The common unit normal of two edges, the least and greatest reach of the prism along it, and whether the edges are parallel:
+/// then it is none.
+struct Common<F: Num> {
+    normal: Vec3<F>,
+    span: [F; 2],
+    parallel: F::Mask,
+}
+
+impl<F: Num> Common<F> {
+    /// The distance of the prism and the other shape.
+    #[inline(always)]
+    fn gap<R: Reach<F>>(&self, other: &R, radius: F) -> F {
+        let half = other.reach(self.normal) + radius;
+        let gap = (self.span[0] - half).max(-self.span[1] - half);
+        F::select(self.parallel, F::c(-1e18), gap)
+    }
+}
+
+impl<F: Num> Prism<F> {
+    /// A lower bound of the distance to another shape, which has the given axes and its centre at the origin: along the normals
+    /// of all faces and, if asked, of all pairs of edges.
+    #[inline(always)]
+    pub fn gap<R: Reach<F>>(
+        &self,
+        axes: &Mat3<F>,
+        other: &R,
+        radius: F,
+        field: &FieldReach<F>,
+        with_edges: bool,
+    ) -> F {
+        let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
+        let own = OwnPrism::new(self, axes);
+        let mut gap = (x - field.half[0]).max(y - field.half[1]);
+        gap = gap
+            .max(across - field.across)
+            .max(bottom - field.half[2])
+            .max(top - other.reach(own.up) - radius);
+        for &j in R::FACES {
+            let mut unit = [F::c(0.0); 3];
+            unit[j] = F::c(1.0);
+            let (half, [low, high]) = (other.reach(Vec3(unit)) + radius, own.span(j));
+            gap = gap.max(low - half).max(-high - half);
+        }
+        if with_edges {
+            if R::EDGES.contains(&0) {
+                gap = own.gap_across::<0, R>(other, radius, gap);
+            }
+            if R::EDGES.contains(&1) {
+                gap = own.gap_across::<1, R>(other, radius, gap);
+            }
+            if R::EDGES.contains(&2) {
+                gap = own.gap_across::<2, R>(other, radius, gap);
+            }
+        }
+        gap
+    }
+
+    /// The best of its faces, the other's faces and the pairs of edges: in penetration that is exact. Edges of its bottom are left
+    /// out. The other shape has the given axes, and its centre is the origin.
+    ///
+    /// Only normals whose cosine to the top's is at least `facing` are the way out: see [`super::prisms`].
+    #[inline(always)]
+    pub fn best_axis<R: Reach<F>>(
+        &self,
+        axes: &Mat3<F>,
+        other: &R,
+        tolerance: F,
+        facing: f64,
+    ) -> PrismAxis<F> {
+        let c = F::c;
+        let own = OwnPrism::new(self, axes);
+        let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
+        let distance = top - other.reach(own.up);
+        let mut best = Search {
+            normal: -own.up,
+            distance,
+            gap: distance,
+            code: c(0.0),
+        };
+        let limits = Limits { tolerance, facing };
+        let [u, v, w] = own.field;
+        let (side, [a, b]) = (self.side, self.across);
+        let m = u * -side;
+        best.offer_face(m, x - other.reach(m), m.dot(own.up), limits);
+        let m = v * side;
+        best.offer_face(m, y - other.reach(m), m.dot(own.up), limits);
+        let m = u.scale_add(a, v * b);
+        best.offer_face(m, across - other.reach(m), m.dot(own.up), limits);
+        best.offer_face(-w, bottom - other.reach(w), -w.dot(own.up), limits);
+        for &j in R::FACES {
+            let mut unit = [c(0.0); 3];
+            unit[j] = c(1.0);
+            let (unit, rise) = (Vec3(unit), own.up[j]);
+            best.offer(unit, own.span(j), other.reach(unit), rise, limits, 2.0);
+        }
+        if R::EDGES.contains(&0) {
+            own.offer_across::<0, R>(other, limits, &mut best);
+        }
+        if R::EDGES.contains(&1) {
+            own.offer_across::<1, R>(other, limits, &mut best);
+        }
+        if R::EDGES.contains(&2) {
+            own.offer_across::<2, R>(other, limits, &mut best);
+        }
+        self.features(axes, &best)
+    }
+
+    /// The axis that was found, in the field's axes, with its features.
+    #[inline(always)]
+    fn features(&self, axes: &Mat3<F>, best: &Search<F>) -> PrismAxis<F> {
+        let c = F::c;
+        let code = best.code;
+        // the normal of the top as it is, without the error of two rotations
+        let normal = select(code.lt(c(0.5)), -self.up, *axes * best.normal);
+        let j = F::select(code.lt(c(6.5)), c(0.0), c(1.0));
+        let j = F::select(code.lt(c(10.5)), j, c(2.0));
+        let i = code - j.fma(c(4.0), c(3.0));
+        let [p, q, k] = self.top;
+        let [[_, pq], [_, qk], [_, kp]] = self.top_edges();
+        let (first, second, third) = (i.lt(c(0.5)), i.lt(c(1.5)), i.lt(c(2.5)));
+        let corner = select(third, k, self.nearest_corner(normal));
+        let way = select(third, kp, Vec3([c(0.0), c(0.0), c(-1.0)]));
+        let corner = select(first, p, select(second, q, corner));
+        let way = select(first, pq, select(second, qk, way));
+        let of_edges = F::select(c(2.5).lt(code), c(2.0), c(1.0));
+        PrismAxis {
+            axis: SeparatingAxis {
+                normal,
+                distance: best.distance,
+            },
+            gap: best.gap,
+            kind: F::select(code.lt(c(1.5)), c(0.0), of_edges),
+            edge: [corner, way * c(1.0).div(way.dot(way).sqrt())],
+            other: column_at(j, *axes),
+        }
+    }
+}

@@ -1,0 +1,395 @@
+//! Constraint rows of contacts: tangents, Jacobian, stiffness and reference acceleration (Todorov 2014; MuJoCo
+//! documentation, "Computation: constraint model").
+//!
+//! ```text
+//! v = J q̇, of the second body relative to the first, along normal and tangents
+//! elliptic      R₀ = (1 - d)/d w          D₁ = D₂ = impratio D₀
+//! pyramidal     R₀ = (1 - d)/d w (1 + μ²)  D = 1 / (2 μ² R₀ / impratio), of the edges n ± μ t
+//! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
+//! ```
+
+use super::joint_rows::impedance;
+use crate::arrays::Array as A;
+use crate::constants::Constants;
+use crate::constants::contact::Cone;
+use crate::constants::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row, turning};
+use crate::each;
+use crate::lane::{Cx, Num, Real};
+use crate::math::spatial::Spatial;
+use crate::math::vec3::{Vec3, load_vec3};
+use crate::step::collide::contact_slack;
+use crate::step::{BlockOf, ConstantsOf, Stage};
+
+/// Constraint rows of contacts.
+pub struct ContactRows;
+
+impl Stage for ContactRows {
+    const READS: &'static [A] = &[
+        A::LeftOut,
+        A::JointQd,
+        A::Origin,
+        A::Reference,
+        A::Motion,
+        A::ContactPoints,
+    ];
+    const WRITES: &'static [A] = &[A::LeftOut, A::ContactRows];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.contacts.groups.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        contact_rows(cx, m, b);
+    }
+}
+
+/// Writes the rows of all contacts that the worlds have now.
+#[inline(always)]
+fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let t = &m.contacts;
+    note_overflow(cx, t, &mut b.left_out[0]);
+    for (k, class) in t.classes.iter().enumerate() {
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let contact = Contact::read(cx, t, k, r);
+            let velocity = contact.write_jacobian(cx, b);
+            if let Some(block) = class.turns {
+                contact.write_turning(cx, b, block);
+            }
+            let swing = swing_between(cx, m, b, class);
+            contact.write_softness(cx, m, velocity, swing);
+        });
+    }
+}
+
+/// A contact whose row is written.
+struct Contact<'a, C: Cx> {
+    t: &'a Contacts<<C::F as Num>::Real>,
+    class: &'a Class<<C::F as Num>::Real>,
+    /// Place of the class in the list.
+    number: usize,
+    row: C::I,
+    /// Index of its pair.
+    pair: C::F,
+    /// From the reference point of the class's second tree [m].
+    point: Vec3<C::F>,
+    /// 1 with friction, 0 without.
+    rubs: C::F,
+    /// Normal and two tangents; the tangents are 0 without friction.
+    frame: [Vec3<C::F>; 3],
+}
+
+impl<'a, C: Cx> Contact<'a, C> {
+    /// Reads what the narrow phase left, and chooses the tangents.
+    #[inline(always)]
+    fn read(cx: &mut C, t: &'a Contacts<<C::F as Num>::Real>, number: usize, r: C::I) -> Self {
+        let class = &t.classes[number];
+        let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
+        let point = load_vec3(cx, t.memory.rows, r, row::POINT);
+        let pair = cx.load(t.memory.rows, r, row::PAIR);
+        let rubs = shared(cx, t, class, pair, pair::RUBS);
+        let along = match t.cone {
+            Cone::Elliptic => None,
+            Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
+        };
+        let tangents = tangents(normal, along);
+        Contact {
+            t,
+            class,
+            number,
+            row: r,
+            pair,
+            point,
+            rubs,
+            frame: [normal, tangents[0] * rubs, tangents[1] * rubs],
+        }
+    }
+
+    /// A scalar of the contact's pair.
+    #[inline(always)]
+    fn of_pair(&self, cx: &mut C, k: usize) -> C::F {
+        shared(cx, self.t, self.class, self.pair, k)
+    }
+
+    /// Writes J and the tangents, and returns J q̇.
+    #[inline(always)]
+    fn write_jacobian(&self, cx: &mut C, b: &BlockOf<C>) -> [C::F; 3] {
+        let (t, class, frame, w) = (self.t, self.class, &self.frame, &b.work);
+        // the same point from the reference point of the first tree
+        let second = w.reference[class.trees.1];
+        let point_first = match class.trees.0 {
+            Some(tree) if tree != class.trees.1 => self.point + (second - w.reference[tree]),
+            _ => self.point,
+        };
+        let mut torques = [[Vec3::zero(); 3]; 2];
+        for (i, axis) in frame.iter().enumerate() {
+            torques[0][i] = point_first.cross(*axis);
+            torques[1][i] = self.point.cross(*axis);
+        }
+        // J(i, dof) = ± (axis · v + (point × axis) · ω)
+        let mut velocity = [C::F::c(0.0); 3];
+        for (c, column) in class.columns.iter().enumerate() {
+            let Spatial([linear, angular]) = w.motion[column.dof];
+            let lever = self.of_pair(cx, column.lever);
+            let speed = cx.get(&b.joint_qd[column.dof]);
+            let torques = &torques[usize::from(!column.is_first)];
+            let mut jacobian = [C::F::c(0.0); 3];
+            for i in 0..3 {
+                let moved = linear.dot(frame[i]) + angular.dot(torques[i]);
+                jacobian[i] = cx.or_nothing(lever * moved);
+                velocity[i] = jacobian[i].fma(speed, velocity[i]);
+            }
+            cx.fill_all(t.memory.rows, self.row, row::JACOBIAN + 3 * c, jacobian);
+        }
+        cx.fill_all(t.memory.rows, self.row, row::TANGENTS, frame[1].0);
+        cx.fill_all(t.memory.rows, self.row, row::TANGENTS + 3, frame[2].0);
+        velocity
+    }
+
+    /// Writes the rows of rotations about the normal and the tangents, scaled by their friction over that of sliding.
+    #[inline(always)]
+    fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
+        let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
+        let twist = cx.pick(t.turning, self.pair, 0) * self.rubs;
+        let roll = cx.pick(t.turning, self.pair, 1) * self.rubs;
+        let scales = [twist, roll, roll];
+        let mut velocity = [zero; 3];
+        for (c, column) in self.class.columns.iter().enumerate() {
+            let Spatial([_, angular]) = b.work.motion[column.dof];
+            let lever = self.of_pair(cx, column.lever);
+            let speed = cx.get(&b.joint_qd[column.dof]);
+            let mut jacobian = [zero; 3];
+            for i in 0..3 {
+                jacobian[i] = cx.or_nothing(lever * scales[i] * angular.dot(self.frame[i]));
+                velocity[i] = jacobian[i].fma(speed, velocity[i]);
+            }
+            cx.fill_all(
+                t.memory.rows,
+                self.row,
+                block + turning::JACOBIAN + 3 * c,
+                jacobian,
+            );
+        }
+        let damping = match t.cone {
+            Cone::Elliptic => self.of_pair(cx, pair::SLIDING),
+            Cone::Pyramidal => self.of_pair(cx, pair::DAMPING),
+        };
+        let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
+        let position = distance - self.of_pair(cx, pair::MARGIN);
+        let smaller = self.of_pair(cx, pair::SMALLER);
+        let pushes = position.lt(contact_slack(smaller));
+        let mut aref = [zero; 3];
+        let mut exists = [zero; 3];
+        for i in 0..3 {
+            aref[i] = C::F::select(pushes, -(velocity[i] * damping), zero);
+            exists[i] = C::F::select(zero.lt(scales[i]), one, zero);
+        }
+        cx.fill_all(t.memory.rows, self.row, block + turning::AREF, aref);
+        cx.fill_all(t.memory.rows, self.row, block + turning::EXISTS, exists);
+    }
+
+    /// d(r) of the contact's pair.
+    #[inline(always)]
+    fn impedance(&self, cx: &mut C, m: &ConstantsOf<C>, position: C::F) -> C::F {
+        let Some(kinds) = m.contacts.impedances.of_classes.get(self.number) else {
+            return impedance(&m.contact_impedance, position);
+        };
+        let mut d = impedance(&m.contacts.impedances.all[kinds[0]], position);
+        if let [_, others @ ..] = &kinds[..] {
+            let own = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
+            for &kind in others {
+                let is_it = (own - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
+                d = C::F::select(
+                    is_it,
+                    impedance(&m.contacts.impedances.all[kind], position),
+                    d,
+                );
+            }
+        }
+        d
+    }
+
+    /// Writes D, aref and the coefficient of friction.
+    #[inline(always)]
+    fn write_softness(
+        &self,
+        cx: &mut C,
+        m: &ConstantsOf<C>,
+        velocity: [C::F; 3],
+        swing: Option<Vec3<C::F>>,
+    ) {
+        let (t, r) = (self.t, self.row);
+        let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+        let distance = cx.load(t.memory.rows, r, row::DISTANCE);
+        let position = distance - self.of_pair(cx, pair::MARGIN);
+        let d = self.impedance(cx, m, position);
+        let mu = match t.memory.mu.rows {
+            0 => self.of_pair(cx, pair::MU),
+            _ => cx.load(t.memory.rows, r, row::MU),
+        };
+        let mu = mu * self.rubs;
+        let weight = self.of_pair(cx, pair::WEIGHT);
+        let stiff = d.div((one - d) * weight);
+        let damping = self.of_pair(cx, pair::DAMPING);
+        let spring = self.of_pair(cx, pair::STIFFNESS) * d * position;
+        let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
+        let (stiff, sliding) = match t.cone {
+            Cone::Elliptic => (stiff, self.of_pair(cx, pair::SLIDING)),
+            Cone::Pyramidal => (stiff * edge_stiffness(t.impratio, mu), damping),
+        };
+        for i in 1..3 {
+            aref[i] = -(velocity[i] * sliding);
+        }
+        // a contact past the margin has no force
+        let smaller = self.of_pair(cx, pair::SMALLER);
+        let pushes = position.lt(contact_slack(smaller));
+        let stiff = C::F::select(pushes, stiff, zero);
+        cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
+        if t.cone == Cone::Elliptic {
+            let ratio = C::F::c(1.0 / t.impratio.to_f64());
+            let soft = stiff.div((mu * mu).fma(ratio, one));
+            cx.fill(t.memory.rows, r, row::SOFT, soft);
+        }
+        cx.fill(t.memory.rows, r, row::MU, mu);
+        for (x, axis) in aref.iter_mut().zip(self.frame) {
+            if let Some(swing) = swing {
+                *x = *x + axis.dot(swing);
+            }
+            *x = C::F::select(pushes, *x, zero);
+        }
+        cx.fill_all(t.memory.rows, r, row::AREF, aref);
+    }
+}
+
+/// D of a pyramid's edge over that of the elliptic cone's normal row: impratio / (2 μ² (1 + μ²)).
+#[inline(always)]
+fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
+    let square = mu * mu;
+    let mut edges = F::k(impratio).div(square + square);
+    edges = edges.div(F::c(1.0) + square);
+    if !F::Real::DOUBLE {
+        edges = edges.min(F::c(EDGES_MAX));
+    }
+    // without friction the four edges coincide
+    F::select(F::c(0.0).lt(mu), edges, F::c(0.25))
+}
+
+/// Upper bound of [`edge_stiffness`] in `f32` [–].
+///
+/// An edge is then as rigid as `f32` can resolve. With 20 times as much, rounding threw bodies off. MuJoCo's is larger for
+/// mu < 0.22 at the default impratio of 1000.
+const EDGES_MAX: f64 = 1e4;
+
+/// The difference between MuJoCo's J q̈ and ours. The acceleration of a free joint is that of its frame's origin there, of the
+/// centre of mass here: they differ by ω × (ω × r). None where every centre of mass is its frame's origin.
+#[inline(always)]
+fn swing_between<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    class: &Class<<C::F as Num>::Real>,
+) -> Option<Vec3<C::F>> {
+    let (first, second) = class.trees;
+    if first == Some(second) {
+        // both bodies move with the same tree
+        return None;
+    }
+    let first = first.and_then(|tree| swing(cx, m, b, tree));
+    let second = swing(cx, m, b, second);
+    match (first, second) {
+        (Some(first), Some(second)) => Some(second - first),
+        (Some(first), None) => Some(first * -C::F::c(1.0)),
+        (None, second) => second,
+    }
+}
+
+/// ω × (ω × r) of a tree's free body, with its centre of mass at r from its frame's origin.
+#[inline(always)]
+fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
+    let free = m.trees[tree].free?;
+    let body = &m.bodies[free];
+    if body.center.iter().all(|x| x.to_f64() == 0.0) {
+        return None;
+    }
+    let mut spin = Vec3::zero();
+    for (i, x) in spin.iter_mut().enumerate() {
+        *x = cx.get(&b.joint_qd[body.dof + 3 + i]);
+    }
+    // the frame's origin is kept relative to the centre
+    Some(spin.cross(b.work.origin[free].cross(spin)))
+}
+
+/// Keeps the largest count of contacts that did not fit.
+#[inline(always)]
+fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mut C::V) {
+    let mut left_out = C::F::c(0.0);
+    if t.may_overflow {
+        let row = cx.at(t.classes.len() + COUNT_LEFT_OUT);
+        left_out = cx.load(t.memory.counts, row, 0);
+    }
+    for (k, class) in t.classes.iter().enumerate() {
+        let row = cx.at(k);
+        let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
+        left_out = left_out + over.max(C::F::c(0.0));
+    }
+    let left_out = cx.get(most).max(left_out);
+    cx.set(most, left_out);
+}
+
+/// The list of a class's contacts.
+#[inline(always)]
+pub(crate) fn class_list<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    class: usize,
+) -> C::List {
+    let (at, first) = (cx.at(class), cx.at(t.classes[class].first));
+    let capacity = cx.at(t.classes[class].capacity);
+    cx.kept(t.memory.counts, at, first, capacity)
+}
+
+/// A scalar of a contact's pair: a constant where all pairs of the class share it.
+#[inline(always)]
+fn shared<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    class: &Class<<C::F as Num>::Real>,
+    pair: C::F,
+    k: usize,
+) -> C::F {
+    match class.shared[k] {
+        Some(x) => C::F::k(x),
+        None => cx.pick(t.handles.pair_numbers, pair, k),
+    }
+}
+
+/// Two unit vectors across the normal, as MuJoCo's `mju_makeFrame` chooses them: the first is along a direction if one is
+/// given, else along y, or along z where the normal is near y.
+#[inline(always)]
+pub(in crate::step) fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let steep = normal[1].abs().lt(F::c(0.5));
+    let axis = Vec3([
+        zero,
+        F::select(steep, one, zero),
+        F::select(steep, zero, one),
+    ]);
+    let mut across = across(normal, axis);
+    if let Some(along) = along {
+        let first = self::across(normal, along);
+        // an upright capsule has no direction across the normal, up to the rounding of `f32`
+        let lies = F::c(1e-12).lt(first.dot(first));
+        for (x, y) in across.iter_mut().zip(*first) {
+            *x = F::select(lies, y, *x);
+        }
+    }
+    let first = across * one.div(across.dot(across).sqrt());
+    [first, normal.cross(first)]
+}
+
+/// The part of a direction across the normal.
+#[inline(always)]
+fn across<F: Num>(normal: Vec3<F>, axis: Vec3<F>) -> Vec3<F> {
+    normal.scale_add(-axis.dot(normal), axis)
+}

@@ -1,0 +1,128 @@
+//! Constraint rows of joints: stiffness D and reference acceleration of each (Todorov 2014; MuJoCo
+//! documentation, "Computation: constraint model").
+//!
+//! ```text
+//! aref = -b v - k d(r) r          R = (1 - d) / d × inverse weight,  D = 1 / R
+//! ```
+//!
+//! Rows are in MuJoCo's order: equalities, frictions, limits. Their Jacobians have one or two entries, known when the model
+//! is compiled. Only the side of a limit is found at run time.
+
+use crate::arrays::Array as A;
+use crate::constants::{Impedance, Soft};
+use crate::lane::{Cx, Num, Real};
+use crate::step::{BlockOf, ConstantsOf, Stage};
+use crate::when;
+
+/// Constraint rows of joints: stiffness and reference acceleration.
+pub struct Constraint;
+
+impl Stage for Constraint {
+    const READS: &'static [A] = &[A::JointQ, A::JointQd, A::Params];
+    const WRITES: &'static [A] = &[A::EfcD, A::EfcAref, A::LimitSide];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        rows(cx, m, b);
+    }
+}
+
+/// Writes D and aref of every row, and the side of every limit.
+#[inline(always)]
+fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let w = &mut b.work;
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let mut row = 0;
+    for equality in &m.equalities {
+        let multiplier = C::F::k(equality.multiplier);
+        let (f, l) = (equality.follower, equality.leader);
+        let (led, own) = (m.dofs[l].coord, m.dofs[f].coord);
+        let position = multiplier.fnma(cx.get(&b.joint_q[led]), cx.get(&b.joint_q[own]))
+            - C::F::k(equality.offset);
+        let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
+        let (weight, aref) = soft_row(&equality.soft, position, velocity);
+        cx.set(&mut b.efc_weight[row], weight);
+        cx.set(&mut b.efc_aref[row], aref);
+        row += 1;
+    }
+    for friction in &m.frictions {
+        let aref = -(cx.get(&b.joint_qd[friction.dof]) * C::F::k(friction.damping));
+        cx.set(&mut b.efc_weight[row], C::F::k(friction.weight));
+        cx.set(&mut b.efc_aref[row], aref);
+        row += 1;
+    }
+    let distance = &mut w.limit_distance;
+    let mut nearest = zero;
+    for (n, limit) in m.limits.iter().enumerate() {
+        let q = cx.get(&b.joint_q[m.dofs[limit.dof].coord]);
+        let (above, below) = (q - C::F::k(limit.lower), C::F::k(limit.upper) - q);
+        w.limit_side[n] = C::F::select(above.lt(below), one, -one);
+        distance[n] = above.min(below);
+        nearest = nearest.min(distance[n]);
+        cx.set(&mut b.efc_weight[row + n], zero);
+        cx.set(&mut b.efc_aref[row + n], zero);
+    }
+    // most blocks have no world at a limit
+    when!(cx, nearest.lt(zero), {
+        for (n, limit) in m.limits.iter().enumerate() {
+            let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
+            let (weight, aref) = soft_row(&limit.soft, distance[n], velocity);
+            let active = distance[n].lt(zero);
+            cx.set(
+                &mut b.efc_weight[row + n],
+                C::F::select(active, weight, zero),
+            );
+            cx.set(&mut b.efc_aref[row + n], C::F::select(active, aref, zero));
+        }
+    });
+}
+
+/// x ≥ 0 to a power of at least 1. The digits of a power that is no whole number become roots.
+#[inline(always)]
+fn powered<F: Num>(x: F, power: f64) -> F {
+    let mut product = x;
+    for _ in 1..power as usize {
+        product = product * x;
+    }
+    let (mut digits, mut root) = (power.fract(), x);
+    while digits > 0.0 {
+        root = root.sqrt();
+        digits *= 2.0;
+        if digits >= 1.0 {
+            product = product * root;
+            digits -= 1.0;
+        }
+    }
+    product
+}
+
+/// (D, aref) of a row at this position and velocity.
+#[inline(always)]
+fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
+    let d = impedance(&soft.impedance, position);
+    let weight = d.div((F::c(1.0) - d) * F::k(soft.inverse_weight));
+    let spring = F::k(soft.stiffness) * d * position;
+    (weight, -velocity.fma(F::k(soft.damping), spring))
+}
+
+/// d(r): from `d_min` at 0 to `d_max` at `width`, along two powers that meet at the midpoint (MuJoCo: `solimp`).
+#[inline(always)]
+pub(in crate::step) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
+    let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());
+    let x = (position.abs() * F::k(i.inverse_width)).min(one);
+    let rest = one - x;
+    let power = i.power.to_f64();
+    let (rising, falling) = if power == 2.0 {
+        let rising = x * x * F::c(1.0 / midpoint);
+        (
+            rising,
+            (rest * rest).fnma(F::c(1.0 / (1.0 - midpoint)), one),
+        )
+    } else {
+        let rising = powered(x, power) * F::c(1.0 / midpoint.powf(power - 1.0));
+        let scale = F::c(1.0 / (1.0 - midpoint).powf(power - 1.0));
+        (rising, powered(rest, power).fnma(scale, one))
+    };
+    let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
+    y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
+}

@@ -1,0 +1,12 @@
+//! Rows of constraints: what they measure, how soft they are, and what they are driven to.
+//!
+//! | file | rows |
+//! |---|---|
+//! | `joint_rows` | mimic joints, dry friction, limits |
+//! | `ties`, `tied_frames` | equalities and limits of several joints or of frames |
+//! | `contact_rows` | contacts: Jacobian, impedance, friction |
+
+pub mod contact_rows;
+pub mod joint_rows;
+pub mod tied_frames;
+pub mod ties;

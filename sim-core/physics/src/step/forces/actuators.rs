@@ -1,0 +1,359 @@
+//! Actuators (MuJoCo documentation, "Computation: actuation model").
+//!
+//! ```text
+//! l = Σ c q      v = Σ c q̇                                              c: gear times coefficient
+//! force = clamp((g₀ + g₁ l + g₂ v) input + b₀ + b₁ l + b₂ v)            g: gain, b: bias
+//! input = clamp(ctrl), or an activation a:  ȧ = clamp(ctrl)  or  (clamp(ctrl) - a) / T
+//! smooth += clamp(Σ c force)                                            over the actuators of a dof
+//! ```
+//!
+//! Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps the sum in its range, before it is
+//! clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
+
+use super::transmission::measure;
+use crate::arrays::Array as A;
+use crate::constants::actuators::{Activation, ActivationRate, TurningLength};
+use crate::constants::actuators::{Actuator, TendonBound};
+use crate::constants::params::Param;
+use crate::constants::springs::Term;
+use crate::constants::{Constants, Motion};
+use crate::lane::{Cx, MaskOf, Num, Real};
+use crate::math::vec3::Vec3;
+use crate::step::{BlockOf, ConstantsOf, Stage, param};
+
+/// Forces of the actuators.
+pub struct Actuators;
+
+impl Stage for Actuators {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Ctrl,
+        A::Act,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Motion,
+        A::SmoothForce,
+        A::QfrcGravcomp,
+    ];
+    const WRITES: &'static [A] = &[
+        A::SmoothForce,
+        A::ActuatorLength,
+        A::ActuatorVelocity,
+        A::ActuatorForce,
+        A::QfrcActuator,
+        A::ActuatorMoment,
+        A::ActDot,
+    ];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.actuators.all.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        b.work.qfrc_actuator.fill(C::F::c(0.0));
+        for (k, actuator) in m.actuators.all.iter().enumerate() {
+            if let Some(activation) = &actuator.activation {
+                b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
+            }
+        }
+        for bound in &m.actuators.tendon_bounds {
+            let scale = tendon_scale(cx, m, b, bound);
+            for &k in &bound.actuators {
+                b.work.actuator_force[k] = scale;
+            }
+        }
+        for (k, actuator) in m.actuators.all.iter().enumerate() {
+            let input = input(cx, b, actuator, k);
+            let mut force = force(cx, m, b, k, input);
+            let mut bounds = m.actuators.tendon_bounds.iter();
+            if bounds.any(|bound| bound.actuators.contains(&k)) {
+                force = force * b.work.actuator_force[k];
+            }
+            let force = bounded(force, actuator.force_range);
+            b.work.actuator_force[k] = force;
+            for term in &actuator.terms {
+                let joint = &mut b.work.qfrc_actuator[term.dof];
+                *joint = force.fma(C::F::k(term.coefficient), *joint);
+            }
+            if let Some(length) = &actuator.turning {
+                let w = &mut b.work;
+                for (k, &dof) in length.dofs.iter().enumerate() {
+                    let moment = w.actuator_moment[length.first + k];
+                    w.qfrc_actuator[dof] = force.fma(moment, w.qfrc_actuator[dof]);
+                }
+            }
+        }
+        for &dof in &m.compensation.actuated_dofs {
+            let joint = &mut b.work.qfrc_actuator[dof];
+            *joint = *joint + b.work.qfrc_gravcomp[dof];
+        }
+        for bound in &m.actuators.dof_bounds {
+            let joint = &mut b.work.qfrc_actuator[bound.dof];
+            *joint = bounded(*joint, Some(bound.range));
+        }
+        for (smooth, joint) in b.work.smooth_force.iter_mut().zip(&b.work.qfrc_actuator) {
+            *smooth = *smooth + *joint;
+        }
+    }
+}
+
+/// What the forces of a tendon's actuators are multiplied with, so that their sum is in its range.
+#[inline(always)]
+fn tendon_scale<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    bound: &TendonBound<<C::F as Num>::Real>,
+) -> C::F {
+    let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    let mut sum = zero;
+    for &k in &bound.actuators {
+        let input = input(cx, b, &m.actuators.all[k], k);
+        sum = sum + force(cx, m, b, k, input);
+    }
+    // a sum of 0 stays, whatever the range is
+    let acts = zero.lt(sum.abs());
+    let within = bounded(sum, Some(bound.range));
+    C::F::select(acts, within.div(C::F::select(acts, sum, one)), one)
+}
+
+/// The control of actuator `k`, in its range.
+#[inline(always)]
+fn control<F: Num, V>(b: &crate::arrays::Block<F, V>, actuator: &Actuator<F::Real>, k: usize) -> F {
+    bounded(b.ctrl[k], actuator.ctrl_range)
+}
+
+/// How fast an activation changes.
+#[inline(always)]
+fn rate<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    actuator: &Actuator<<C::F as Num>::Real>,
+    activation: &Activation<<C::F as Num>::Real>,
+    k: usize,
+) -> C::F {
+    match activation.rate {
+        ActivationRate::Held => C::F::c(0.0),
+        ActivationRate::Control => control(b, actuator, k),
+        ActivationRate::Filter(time) => {
+            let off = control(b, actuator, k) - cx.get(&b.act[activation.place]);
+            off.div(C::F::k(time))
+        }
+    }
+}
+
+/// An activation after a step that begins at `act`.
+#[inline(always)]
+pub(in crate::step) fn next<F: Num>(activation: &Activation<F::Real>, act: F, rate: F) -> F {
+    bounded(rate.fma(F::k(activation.reach), act), activation.range)
+}
+
+/// What the force of actuator `k` follows: its control or its activation.
+#[inline(always)]
+fn input<C: Cx>(
+    cx: &mut C,
+    b: &BlockOf<C>,
+    actuator: &Actuator<<C::F as Num>::Real>,
+    k: usize,
+) -> C::F {
+    let Some(activation) = &actuator.activation else {
+        return control(b, actuator, k);
+    };
+    let act = cx.get(&b.act[activation.place]);
+    match activation.early {
+        true => next(activation, act, b.work.act_dot[activation.place]),
+        false => act,
+    }
+}
+
+/// Force of actuator `k` before it is clamped; writes its length and velocity. `input` is its control or activation.
+#[inline(always)]
+fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, input: C::F) -> C::F {
+    let actuator = &m.actuators.all[k];
+    let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
+    if let Some(turning) = &actuator.turning {
+        length = measure(cx, m, b, turning);
+        for (k, &dof) in turning.dofs.iter().enumerate() {
+            let moment = b.work.actuator_moment[turning.first + k];
+            velocity = cx.get(&b.joint_qd[dof]).fma(moment, velocity);
+        }
+    }
+    for term in &actuator.terms {
+        let coefficient = C::F::k(term.coefficient);
+        length = cx
+            .get(&b.joint_q[m.dofs[term.dof].coord])
+            .fma(coefficient, length);
+        velocity = cx.get(&b.joint_qd[term.dof]).fma(coefficient, velocity);
+    }
+    b.work.actuator_length[k] = length;
+    b.work.actuator_velocity[k] = velocity;
+    let gain = law(
+        m,
+        &b.params,
+        Param::ActuatorGain,
+        (k, actuator.gain),
+        [length, velocity],
+    );
+    let bias = law(
+        m,
+        &b.params,
+        Param::ActuatorBias,
+        (k, actuator.bias),
+        [length, velocity],
+    );
+    gain.fma(input, bias)
+}
+
+/// A gain or bias of an actuator: constant, per length, per velocity.
+#[inline(always)]
+fn law<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    which: Param,
+    (k, own): (usize, [F::Real; 3]),
+    [length, velocity]: [F; 2],
+) -> F {
+    let varies = m.varying.first(which).is_some();
+    let mut sum = param(m, params, which, 3 * k, own[0]);
+    // most actuators have no such term
+    if varies || own[1].to_f64() != 0.0 {
+        sum = length.fma(param(m, params, which, 3 * k + 1, own[1]), sum);
+    }
+    if varies || own[2].to_f64() != 0.0 {
+        sum = velocity.fma(param(m, params, which, 3 * k + 2, own[2]), sum);
+    }
+    sum
+}
+
+#[inline(always)]
+fn bounded<F: Num>(x: F, range: Option<[F::Real; 2]>) -> F {
+    match range {
+        Some([least, most]) => x.max(F::k(least)).min(F::k(most)),
+        None => x,
+    }
+}
+
+/// May the force of an actuator depend on its velocity?
+pub(in crate::step) fn is_damped<R: Real>(m: &Constants<R>, actuator: &Actuator<R>) -> bool {
+    let of = |which: Param, own: [R; 3]| m.varying.first(which).is_some() || own[2].to_f64() != 0.0;
+    of(Param::ActuatorGain, actuator.gain) || of(Param::ActuatorBias, actuator.bias)
+}
+
+/// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
+/// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`), and what that has on the right-hand side in `acceleration`.
+#[inline(always)]
+pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let dt = C::F::k(m.dt);
+    let actuators = m.actuators.all.iter().enumerate();
+    for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(m, actuator)) {
+        let input = input(cx, b, actuator, k);
+        let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
+            param(m, &b.params, which, 3 * k + 2, own[2])
+        };
+        let gain = of(Param::ActuatorGain, actuator.gain);
+        let slope = gain.fma(input, of(Param::ActuatorBias, actuator.bias));
+        let mut damping = -(slope * dt);
+        if let Some([least, most]) = actuator.force_range {
+            let force = b.work.actuator_force[k];
+            let within: MaskOf<C> = C::F::k(least).lt(force) & force.lt(C::F::k(most));
+            damping = C::F::select(within, damping, C::F::c(0.0));
+        }
+        add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
+        if let Some(length) = &actuator.turning {
+            let w = &mut b.work;
+            let moments = &w.actuator_moment[length.first..];
+            add_moments(m, &mut w.mass_matrix, &length.dofs, moments, damping);
+            subtract_swing(cx, m, b, length, damping);
+        }
+    }
+    for tendon in &m.springs.tendons {
+        let damping = C::F::k(tendon.damping) * dt;
+        add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
+    }
+}
+
+/// Subtracts x times the part of MuJoCo's J q̈ that ours does not have, from the dofs of the same branch: its acceleration of
+/// a free joint is that of the frame's origin, which differs from that of the centre of mass by ω × (ω × r).
+#[inline(always)]
+fn subtract_swing<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    length: &TurningLength<<C::F as Num>::Real>,
+    x: C::F,
+) {
+    for (k, body) in m.bodies.iter().enumerate() {
+        let first = length.dofs.iter().position(|&dof| dof == body.dof);
+        let (Motion::Free, Some(first)) = (body.motion, first) else {
+            continue;
+        };
+        let omega = Vec3(std::array::from_fn(|i| {
+            cx.get(&b.joint_qd[body.dof + 3 + i])
+        }));
+        let w = &mut b.work;
+        let arm = Vec3::zero() - w.rotation[k] * Vec3::constant(body.center);
+        let swing = omega.cross(omega.cross(arm));
+        let mut sum = C::F::c(0.0);
+        for i in 0..3 {
+            let moment = w.actuator_moment[length.first + first + i];
+            sum = moment.fma(swing[i], sum);
+        }
+        for (place, &dof) in length.dofs.iter().enumerate() {
+            if shared(m, dof, body.dof).is_some() {
+                let moment = w.actuator_moment[length.first + place];
+                w.acceleration[dof] = (x * sum).fnma(moment, w.acceleration[dof]);
+            }
+        }
+    }
+}
+
+/// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.
+#[inline(always)]
+fn add_product<F: Num>(
+    m: &Constants<F::Real>,
+    mass_matrix: &mut [F],
+    terms: &[Term<F::Real>],
+    x: F,
+) {
+    for (i, first) in terms.iter().enumerate() {
+        let scaled = x * F::k(first.coefficient);
+        for second in &terms[..i + 1] {
+            if let Some(place) = shared(m, first.dof, second.dof) {
+                let entry = &mut mass_matrix[place];
+                *entry = scaled.fma(F::k(second.coefficient), *entry);
+            }
+        }
+    }
+}
+
+/// The same of a length with moments, one for each of its dofs.
+#[inline(always)]
+fn add_moments<F: Num>(
+    m: &Constants<F::Real>,
+    mass_matrix: &mut [F],
+    dofs: &[usize],
+    moments: &[F],
+    x: F,
+) {
+    for (i, first) in dofs.iter().enumerate() {
+        let scaled = x * moments[i];
+        for (second, moment) in dofs[..i + 1].iter().zip(moments) {
+            if let Some(place) = shared(m, *first, *second) {
+                mass_matrix[place] = scaled.fma(*moment, mass_matrix[place]);
+            }
+        }
+    }
+}
+
+/// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
+#[inline(always)]
+fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
+    let (lower, upper) = (first.max(second), first.min(second));
+    let (start, end) = m.dofs[lower].entries;
+    let mut met = m.mass_entries[start..end].iter();
+    met.find(|met| met.other == upper).map(|met| met.place)
+}

@@ -1,0 +1,164 @@
+//! Forces of the medium around links (MuJoCo documentation, "Computation: fluid forces, inertia model").
+//!
+//! ```text
+//! f(i) = -(cᵥ + dᵥ(i) |v(i)|) v(i)      v: velocity of the centre of mass less the wind, along the axes i of inertia
+//! n(i) = -(cₒ + dₒ(i) |ω(i)|) ω(i)
+//! ```
+//!
+//! With the box that has a link's mass and inertia, of sides b, and d their mean: cᵥ = 3π d η, cₒ = π d³ η,
+//! dᵥ = ρ bⱼ bₖ / 2, dₒ = ρ bᵢ (bⱼ⁴ + bₖ⁴) / 64. A step with `implicitfast` is implicit in them:
+//!
+//! ```text
+//! M += h Σ Jᵀ B J      B = diag(c + 2 d |v|)      and h Jᵀ B J c less on the right, c as in [`crate::step::tree::free_joints`]
+//! ```
+
+use super::link_forces;
+use crate::arrays::{Array as A, Workspace};
+use crate::constants::Constants;
+use crate::constants::passive::Drag;
+use crate::lane::{Cx, Num, Real};
+use crate::math::spatial::{ANGULAR, LINEAR};
+use crate::math::vec3::Vec3;
+use crate::step::{BlockOf, ConstantsOf, Stage};
+
+/// Forces of the medium.
+pub struct Fluid;
+
+impl Stage for Fluid {
+    const READS: &'static [A] = &[
+        A::Rotation,
+        A::Origin,
+        A::Motion,
+        A::Velocity,
+        A::SmoothForce,
+    ];
+    const WRITES: &'static [A] = &[A::SmoothForce];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        !m.drags.is_empty()
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let w = &mut b.work;
+        forces(m, w);
+        for (smooth, projected) in w.smooth_force.iter_mut().zip(&w.joint_force) {
+            *smooth = *smooth + *projected;
+        }
+    }
+}
+
+/// Writes the forces of the medium to `joint_force`.
+#[inline(always)]
+pub(in crate::step) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    link_forces::clear(w);
+    for drag in &m.drags {
+        let flow = Flow::of(w, drag);
+        let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
+        for i in 0..3 {
+            let pull = flow.resistance(drag, LINEAR, i, 1.0) * flow.speed[LINEAR][i];
+            let turn = flow.resistance(drag, ANGULAR, i, 1.0) * flow.speed[ANGULAR][i];
+            force = flow.axes[i].scale_add(-pull, force);
+            torque = flow.axes[i].scale_add(-turn, torque);
+        }
+        link_forces::add(w, drag.body, flow.point, force, torque);
+    }
+    link_forces::project(m, w);
+}
+
+/// How the medium flows around a link.
+struct Flow<F> {
+    /// Centre of mass from the robot's reference point [m].
+    point: Vec3<F>,
+    /// Axes of inertia in the world [–].
+    axes: [Vec3<F>; 3],
+    /// Velocity against the medium, then angular velocity, along these axes [m/s, rad/s].
+    speed: [Vec3<F>; 2],
+}
+
+impl<F: Num> Flow<F> {
+    #[inline(always)]
+    fn of(w: &Workspace<F>, drag: &Drag<F::Real>) -> Flow<F> {
+        let (rotation, velocity) = (&w.rotation[drag.body], w.velocity[drag.body]);
+        let point = rotation.mul_add(Vec3::constant(drag.center), w.origin[drag.body]);
+        let moved = velocity[ANGULAR].cross_add(point, velocity[LINEAR]);
+        let moved = moved - Vec3::constant(drag.wind);
+        let (mut axes, mut speed) = ([Vec3::zero(); 3], [Vec3::zero(); 2]);
+        for i in 0..3 {
+            axes[i] = rotation * Vec3::constant(drag.axes[i]);
+            speed[LINEAR][i] = axes[i].dot(moved);
+            speed[ANGULAR][i] = axes[i].dot(velocity[ANGULAR]);
+        }
+        Flow { point, axes, speed }
+    }
+
+    /// c + times d |v| along an axis, linear or angular.
+    #[inline(always)]
+    fn resistance(&self, drag: &Drag<F::Real>, part: usize, i: usize, times: f64) -> F {
+        let quadratic = F::c(times) * F::k(drag.quadratic[part][i]);
+        quadratic.fma(self.speed[part][i].abs(), F::k(drag.viscous[part]))
+    }
+}
+
+/// Adds h Jᵀ B J to the mass matrix, and subtracts h Jᵀ B J c from the right-hand side, `acceleration`.
+#[inline(always)]
+pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let (w, dt) = (&mut b.work, C::F::k(m.dt));
+    for drag in &m.drags {
+        let flow = Flow::of(w, drag);
+        let tree = m.bodies[drag.body].tree;
+        let last = m.bodies[drag.body].dofs().end - 1;
+        let path = m.dofs[last].entries;
+        let path = &m.mass_entries[path.0..path.1];
+        for part in [LINEAR, ANGULAR] {
+            for i in 0..3 {
+                let axis = flow.axes[i];
+                let arm = flow.point.cross(axis);
+                for entry in path {
+                    let motion = w.motion[entry.other];
+                    // a row of J
+                    w.step[entry.other] = match part {
+                        LINEAR => axis.dot(motion[LINEAR]) + arm.dot(motion[ANGULAR]),
+                        _ => axis.dot(motion[ANGULAR]),
+                    };
+                }
+                let damping = flow.resistance(drag, part, i, 2.0) * dt;
+                // only the acceleration of a free body's frame differs from ours
+                let swing = match (part, m.trees[tree].free) {
+                    (LINEAR, Some(free)) => {
+                        let (spin, origin) = (w.velocity[free][ANGULAR], w.origin[free]);
+                        Some(axis.dot(spin.cross(spin.cross(origin))))
+                    }
+                    _ => None,
+                };
+                add_row::<C>(m, w, last, damping, swing);
+            }
+        }
+    }
+}
+
+/// Adds Jᵀ x J to the mass matrix, J the row of a body in `step`, and subtracts Jᵀ x c from `acceleration`.
+#[inline(always)]
+fn add_row<C: Cx>(
+    m: &ConstantsOf<C>,
+    w: &mut Workspace<C::F>,
+    last: usize,
+    x: C::F,
+    swing: Option<C::F>,
+) {
+    let of = |dof: usize| {
+        let (start, end) = m.dofs[dof].entries;
+        &m.mass_entries[start..end]
+    };
+    for row in of(last) {
+        let scaled = w.step[row.other] * x;
+        for entry in of(row.other) {
+            let place = &mut w.mass_matrix[entry.place];
+            *place = scaled.fma(w.step[entry.other], *place);
+        }
+        if let Some(swing) = swing {
+            let force = &mut w.acceleration[row.other];
+            *force = scaled.fnma(swing, *force);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Springs of joints, springs and dampers of tendons, and dampers of free joints (MuJoCo: `mj_passive`).
+//!
+//! ```text
+//! smooth -= stiffness (q - rest)                       of a joint
+//! smooth -= stiffness log(rest⁻¹ q)                    of a ball, and of the rotation of a free joint
+//! smooth -= c (stiffness (l - rest) + damping v)       of a tendon with the coefficients c; no spring force between its rests
+//! passive = the same - damping q̇                       for output
+//! ```
+//!
+//! A free joint's spring acts at the origin of its frame ([`crate::step::tree::free_joints`]).
+
+use super::{fluid, gravity_compensation};
+use crate::arrays::Array as A;
+use crate::constants::Constants;
+use crate::constants::Motion;
+use crate::constants::params::Param;
+use crate::constants::springs::{PoseSpring, Tendon};
+use crate::lane::{Cx, Num, Real, map};
+use crate::math::quat::{self, conjugate, mul};
+use crate::math::vec3::Vec3;
+use crate::step::constraints::ties::length;
+use crate::step::tree::free_joints;
+use crate::step::tree::kinematics::read_quat;
+use crate::step::{BlockOf, ConstantsOf, Stage, param};
+
+/// Forces of springs and dampers.
+pub struct Springs;
+
+impl Stage for Springs {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::SmoothForce,
+    ];
+    const WRITES: &'static [A] = &[A::SmoothForce];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        let are_there = [
+            !m.springs.joints.is_empty(),
+            !m.springs.tendons.is_empty(),
+            !m.springs.poses.is_empty(),
+            !m.free_joints.is_empty(),
+        ];
+        are_there.contains(&true)
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let mut smooth = std::mem::take(&mut b.work.smooth_force);
+        add_springs(cx, m, b, &mut smooth);
+        free_joints::add_damping_forces(cx, m, b, &mut smooth);
+        free_joints::add_swing_forces(cx, m, b, 1.0, &mut smooth);
+        b.work.smooth_force = smooth;
+    }
+}
+
+/// Passive forces alone, for output: of springs and dampers, of a medium, and those that hold bodies against gravity.
+pub struct Passive;
+
+impl Stage for Passive {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Motion,
+        A::Velocity,
+    ];
+    const WRITES: &'static [A] = &[A::PassiveForce];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let mut passive = std::mem::take(&mut b.work.passive_force);
+        for (j, force) in passive.iter_mut().enumerate() {
+            let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
+            *force = match m.free_joints.contains(&m.dofs[j].body) {
+                true => C::F::c(0.0),
+                false => -(cx.get(&b.joint_qd[j]) * damping),
+            };
+        }
+        add_springs(cx, m, b, &mut passive);
+        free_joints::add_damping_forces(cx, m, b, &mut passive);
+        if !m.compensation.links.is_empty() {
+            gravity_compensation::forces::<C>(m, b);
+            for &d in &m.compensation.passive_dofs {
+                passive[d] = passive[d] + b.work.joint_force[d];
+            }
+        }
+        if !m.drags.is_empty() {
+            fluid::forces(m, &mut b.work);
+            for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {
+                *force = *force + *own;
+            }
+        }
+        b.work.passive_force = passive;
+    }
+}
+
+/// Adds the forces of springs, and of springs and dampers of tendons.
+#[inline(always)]
+fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    for spring in &m.springs.joints {
+        let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+        let force = &mut to[spring.dof];
+        *force = stretch.fnma(C::F::k(spring.stiffness), *force);
+    }
+    for tendon in &m.springs.tendons {
+        let stretch = stretch(cx, m, b, tendon);
+        let mut velocity = C::F::c(0.0);
+        for term in &tendon.terms {
+            let qd = cx.get(&b.joint_qd[term.dof]);
+            velocity = qd.fma(C::F::k(term.coefficient), velocity);
+        }
+        let damped = velocity * C::F::k(tendon.damping);
+        let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
+        for term in &tendon.terms {
+            let force = &mut to[term.dof];
+            *force = pull.fnma(C::F::k(term.coefficient), *force);
+        }
+    }
+    for spring in &m.springs.poses {
+        let body = &m.bodies[spring.body];
+        let stiffness = C::F::k(spring.stiffness);
+        let [slide, turn] = map(pose_stretch(cx, m, b, spring), |x| x * stiffness);
+        let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
+        let force = &mut to[body.dofs()];
+        if body.motion == Motion::Free {
+            free_joints::subtract(force, [slide, turn], rotation, origin);
+            continue;
+        }
+        for i in 0..3 {
+            force[i] = force[i] - turn[i];
+        }
+    }
+}
+
+/// How far a ball or a free joint is from its rest: its position, 0 of a ball, and a rotation vector in the body's axes.
+#[inline(always)]
+pub(in crate::step) fn pose_stretch<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    spring: &PoseSpring<<C::F as Num>::Real>,
+) -> [Vec3<C::F>; 2] {
+    let body = &m.bodies[spring.body];
+    let mut slide = Vec3::zero();
+    let mut first = body.coord;
+    if body.motion == Motion::Free {
+        for i in 0..3 {
+            slide[i] = cx.get(&b.joint_q[first + i]) - C::F::k(spring.position[i]);
+        }
+        first += 3;
+    }
+    let here = read_quat(cx, &b.joint_q, first);
+    let rest = quat::constant(spring.quat);
+    [slide, quat::log(mul(conjugate(rest), here))]
+}
+
+/// How far a tendon is beyond its rests.
+#[inline(always)]
+pub(in crate::step) fn stretch<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    tendon: &Tendon<<C::F as Num>::Real>,
+) -> C::F {
+    let length = length(cx, m, b, &tendon.terms);
+    let [shortest, longest] = tendon.rest.map(C::F::k);
+    length - length.max(shortest).min(longest)
+}

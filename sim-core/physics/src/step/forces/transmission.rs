@@ -1,0 +1,106 @@
+//! Lengths of actuators whose moments change with the state (MuJoCo: `mj_transmission`).
+//!
+//! ```text
+//! ball    l = gear · θ                                     θ: rotation vector
+//! free    l = 0         force = gear, torque = gear        at its frame's origin
+//! site    l = 0         force = R gear, torque = R gear    at the site
+//! site    l = gear · (R'ᵀ (x - x'), θ)                     to a second site with R', x'; θ from its axes to those of the first
+//! ```
+//!
+//! A moment is ∂l̇/∂q̇ of a dof. As in MuJoCo, dofs that move both sites have none.
+
+use crate::arrays::Workspace;
+use crate::constants::Constants;
+use crate::constants::actuators::{LengthKind, Sites, TurningLength};
+use crate::lane::{Cx, Num};
+use crate::math::quat;
+use crate::math::spatial::Spatial;
+use crate::math::vec3::Vec3;
+use crate::step::constraints::tied_frames::{between, carries, placed};
+use crate::step::tree::kinematics::read_quat;
+use crate::step::{BlockOf, ConstantsOf};
+
+/// Writes the moments of a length, and returns it.
+#[inline(always)]
+pub(in crate::step) fn measure<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    length: &TurningLength<<C::F as Num>::Real>,
+) -> C::F {
+    let [x, y, z, u, v, w] = length.gear.map(C::F::k);
+    let (along, about) = (Vec3([x, y, z]), Vec3([u, v, w]));
+    match &length.kind {
+        LengthKind::Ball { coord, in_parent } => {
+            let turned = read_quat(cx, &b.joint_q, *coord);
+            let gear = match in_parent {
+                true => quat::matrix(turned).transpose_mul(along),
+                false => along,
+            };
+            moments(&mut b.work, length)[..3].copy_from_slice(&*gear);
+            quat::log(turned).dot(gear)
+        }
+        LengthKind::Free { body, in_parent } => {
+            let own = &mut b.work;
+            let torque = match in_parent {
+                true => about,
+                false => own.rotation[*body] * about,
+            };
+            // at the centre of mass; the frame's origin is kept relative to it
+            let torque = own.origin[*body].cross_add(along, torque);
+            moments(own, length).copy_from_slice(&Spatial([along, torque]).scalars());
+            C::F::c(0.0)
+        }
+        LengthKind::Site(sites) => of_sites(m, &mut b.work, length, sites, [along, about]),
+    }
+}
+
+/// The moments of a length, one for each of its dofs.
+#[inline(always)]
+pub(in crate::step) fn moments<'a, F: Num>(
+    w: &'a mut Workspace<F>,
+    length: &TurningLength<F::Real>,
+) -> &'a mut [F] {
+    let end = length.first + length.dofs.len();
+    &mut w.actuator_moment[length.first..end]
+}
+
+#[inline(always)]
+fn of_sites<F: Num>(
+    m: &Constants<F::Real>,
+    w: &mut Workspace<F>,
+    length: &TurningLength<F::Real>,
+    sites: &Sites<F::Real>,
+    [along, about]: [Vec3<F>; 2],
+) -> F {
+    let site = placed(w, &sites.site);
+    let reference = sites.reference.as_ref().map(|mount| placed(w, mount));
+    let axes = &reference.as_ref().unwrap_or(&site).rotation;
+    let push = Spatial([axes * along, axes * about]);
+    for (k, &dof) in length.dofs.iter().enumerate() {
+        let Spatial([linear, angular]) = w.motion[dof];
+        let mut moment = F::c(0.0);
+        // the velocity of each that the dof carries
+        let carried = [
+            (Some(&sites.site), Some(&site), 1.0),
+            (sites.reference.as_ref(), reference.as_ref(), -1.0),
+        ];
+        for (mount, placed, sign) in carried {
+            let (Some(mount), Some(placed)) = (mount, placed) else {
+                continue;
+            };
+            if carries(m, mount.body, dof) {
+                let velocity = Spatial([angular.cross_add(placed.point, linear), angular]);
+                moment = F::c(sign).fma(velocity.dot(push), moment);
+            }
+        }
+        w.actuator_moment[length.first + k] = moment;
+    }
+    let Some(reference) = reference else {
+        return F::c(0.0);
+    };
+    let apart = (site.point - reference.point) + (site.reference - reference.reference);
+    let apart = reference.rotation.transpose_mul(apart);
+    let turned = quat::log(between(&site.rotation, &reference.rotation));
+    apart.dot(along) + turned.dot(about)
+}

@@ -1,0 +1,329 @@
+//! Semi-implicit step, implicit in joint damping and drive damping (MuJoCo: `implicitfast`).
+//!
+//! ```text
+//! (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
+//! ```
+//!
+//! In `f32` the rounding error of q + h q̇ is kept and added to the next step (compensated summation, Kahan 1965). Without it an
+//! arm that moves by less than half a rounding of its angle per step would stand still with a velocity, and slip on an object
+//! that it holds.
+//!
+//! A quaternion is rotated by h ω in the body's axes. A free body is stepped as in MuJoCo, by the velocity of its frame's origin
+//! and the angular velocity in its own axes:
+//!
+//! ```text
+//! r = R c     v = v(c) - ω × r     a = a(c) - α × r - ω × (ω × r)
+//! v += h a    p += h v             ω' = Rᵀω + h Rᵀα        R' = R exp(h ω')
+//! ```
+//!
+//! A free body without moving children is also implicit in its gyroscopic force, to first order, as in MuJoCo since 3.11: it
+//! gains no energy by spinning. With J the inertia about c, A the same with armature and damping, and L = J ω:
+//!
+//! ```text
+//! (A + h ∂(ω × L)/∂ω) δ = -h (α × L + ω × J α)       α += δ       a -= h (α × (ω × r) + ω × (α × r))
+//! ```
+
+use crate::arrays::Array as A;
+use crate::constants::actuators::Activation;
+use crate::constants::options::Integrator;
+use crate::constants::params::Param;
+use crate::constants::{Body, Constants, Motion};
+use crate::lane::{Cx, Num, Real};
+use crate::math::factor::{multiply, solve};
+use crate::math::quat::{self, Quat};
+use crate::math::spatial::symmetric;
+use crate::math::vec3::{Mat3, Vec3};
+use crate::step::forces::{actuators, fluid};
+use crate::step::tree::free_joints;
+use crate::step::tree::generalized::keep_accelerations;
+use crate::step::tree::kinematics::read_quat;
+use crate::step::{BlockOf, ConstantsOf, Stage, masses, param};
+
+/// The next state.
+pub struct Integrate;
+
+impl Stage for Integrate {
+    const READS: &'static [A] = &[
+        A::Params,
+        A::Ctrl,
+        A::Act,
+        A::ActDot,
+        A::ActuatorMoment,
+        A::ActuatorForce,
+        A::Rotation,
+        A::Origin,
+        A::Inertia,
+        A::Motion,
+        A::Velocity,
+        A::JointQ,
+        A::JointQRest,
+        A::JointQd,
+        A::JointQdd,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::ConstraintForce,
+    ];
+    // the last stage of a step: the mass matrix is not read after it
+    const WRITES: &'static [A] = &[
+        A::JointQ,
+        A::JointQRest,
+        A::JointQd,
+        A::JointQdd,
+        A::Act,
+        A::MassMatrix,
+    ];
+
+    fn is_needed<R: Real>(m: &Constants<R>) -> bool {
+        m.integrator != Integrator::RungeKutta
+    }
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        if m.damped {
+            implicit_acceleration(cx, m, b);
+        } else {
+            for j in 0..m.dofs.len() {
+                b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
+            }
+        }
+        if m.mujoco_search().is_some() {
+            keep_accelerations(cx, m, b);
+        }
+        for (k, body) in m.bodies.iter().enumerate() {
+            if body.motion == Motion::Free {
+                // a body that carries nothing is implicit in its gyroscopic force
+                let is_alone = m.bodies.iter().all(|other| other.parent != Some(k));
+                let is_implicit = m.integrator == Integrator::ImplicitFast;
+                if is_alone && is_implicit && !free_joints::is_solved(m, k) {
+                    gyroscopic(cx, m, b, k);
+                }
+                integrate_free(cx, m, b, k);
+            } else if body.motion != Motion::Mocap {
+                integrate_joint(cx, m, b, body);
+            }
+        }
+        for activation in activations(m) {
+            let act = cx.get(&b.act[activation.place]);
+            let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
+            cx.set(&mut b.act[activation.place], act);
+        }
+    }
+}
+
+/// The activations of actuators.
+pub(in crate::step) fn activations<R>(m: &Constants<R>) -> impl Iterator<Item = &Activation<R>> {
+    let actuators = m.actuators.all.iter();
+    actuators.filter_map(|actuator| actuator.activation.as_ref())
+}
+
+/// (M + h D) a = τ + Jᵀ f, with the damping D of joints and drives on the diagonal.
+#[inline(always)]
+fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let (w, dt) = (&mut b.work, C::F::k(m.dt));
+    // M q̈ equals the forces, without the rounding of stiff contact forces that cancel
+    let mut rounded = None;
+    if !<<C::F as Num>::Real as Real>::DOUBLE {
+        rounded = crate::step::solver::touching(cx, m);
+    }
+    if rounded.is_some() {
+        for j in 0..m.dofs.len() {
+            w.start[j] = cx.get(&b.joint_qdd[j]);
+        }
+        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
+    }
+    for (j, dof) in m.dofs.iter().enumerate() {
+        let is_mujocos = free_joints::has(m, dof.body);
+        // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
+        let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
+        // nothing drives a free body
+        if m.bodies[dof.body].motion != Motion::Free {
+            damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
+        }
+        if !is_mujocos {
+            let diagonal = m.pattern.at(j, j);
+            w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+        }
+        w.acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
+        if let Some(touching) = rounded {
+            w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
+        }
+    }
+    if m.integrator == Integrator::ImplicitFast {
+        actuators::add_damping(cx, m, b);
+        fluid::add_damping::<C>(m, b);
+    }
+    free_joints::add_damping(cx, m, b);
+    for body in free_joints::solved(m) {
+        free_joints::solve(cx, m, b, body);
+    }
+    let w = &mut b.work;
+    solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
+    for body in free_joints::solved(m) {
+        free_joints::take(m, b, body);
+    }
+}
+
+/// Velocity first, then the position by the new velocity.
+#[inline(always)]
+fn integrate_joint<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+) {
+    let (c, dt) = (body.coord, C::F::k(m.dt));
+    let mut qd = Vec3::zero();
+    for (qd, d) in qd.iter_mut().zip(body.dofs()) {
+        *qd = dt.fma(b.work.acceleration[d], cx.get(&b.joint_qd[d]));
+        cx.set(&mut b.joint_qd[d], *qd);
+    }
+    if body.motion == Motion::Ball {
+        let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
+        write_quat(cx, &mut b.joint_q, c, turned);
+    } else {
+        add_compensated(cx, &mut b.joint_q[c], &mut b.joint_q_rest[c], qd[0], dt);
+    }
+}
+
+/// q += h v, compensated in `f32`.
+#[inline(always)]
+pub(in crate::step) fn add_compensated<C: Cx>(
+    cx: &mut C,
+    q: &mut C::V,
+    rest: &mut C::V,
+    v: C::F,
+    dt: C::F,
+) {
+    let before = cx.get(q);
+    if <<C::F as Num>::Real as Real>::DOUBLE {
+        cx.set(q, dt.fma(v, before));
+        return;
+    }
+    let change = dt.fma(v, cx.get(rest));
+    let after = before + change;
+    // exact where |q| is larger than the change, otherwise off by a rounding of the change
+    cx.set(rest, change - (after - before));
+    cx.set(q, after);
+}
+
+/// Makes the acceleration of a free body implicit in its gyroscopic force.
+#[inline(always)]
+fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
+    let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
+    let (d, params, joint_qd) = (body.dof, &b.params, &b.joint_qd);
+    let (rotation, acceleration) = (&b.work.rotation[k], &mut b.work.acceleration);
+    let (mut spin, mut angular) = (Vec3::zero(), Vec3::zero());
+    for i in 0..3 {
+        spin[i] = cx.get(&joint_qd[d + 3 + i]);
+        angular[i] = acceleration[d + 3 + i];
+    }
+    // relative to the trace, so that determinants of small bodies stay within f32
+    let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
+    let unit = C::F::c(1.0 / trace);
+    let momentum = rotated_inertia(m, params, body, rotation, spin) * unit;
+    let mut columns = [Vec3::zero(); 3];
+    for (i, column) in columns.iter_mut().enumerate() {
+        let mut axis = Vec3::zero();
+        axis[i] = C::F::c(1.0);
+        let inertia = rotated_inertia(m, params, body, rotation, axis) * unit;
+        let rate = axis.cross_add(momentum, spin.cross(inertia));
+        *column = rate.scale_add(dt, inertia);
+        let (j, dof) = (d + 3 + i, &m.dofs[d + 3 + i]);
+        let damping = param(m, params, Param::JointDamping, j, dof.damping);
+        let armature = param(m, params, Param::JointArmature, j, dof.armature);
+        let driven = dt.fma(damping, armature);
+        column[i] = driven.fma(unit, column[i]);
+    }
+    let inertia = rotated_inertia(m, params, body, rotation, angular) * unit;
+    let rate = angular.cross_add(momentum, spin.cross(inertia));
+    let change = rate * -dt;
+    let [x, y, z] = columns;
+    let minors = [y.cross(z), z.cross(x), x.cross(y)];
+    let determinant = x.dot(minors[0]);
+    for i in 0..3 {
+        angular[i] = angular[i] + minors[i].dot(change).div(determinant);
+    }
+    let arm = rotation * Vec3::constant(body.center);
+    let swing = angular.cross_add(spin.cross(arm), spin.cross(angular.cross(arm)));
+    for i in 0..3 {
+        // acceleration of the centre of mass; the step takes that of the origin, which differs by the swing
+        acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
+        acceleration[d + 3 + i] = angular[i];
+    }
+}
+
+/// J v in world axes, J the inertia about the centre of mass; of links whose masses vary, each about its own.
+#[inline(always)]
+fn rotated_inertia<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    body: &Body<F::Real>,
+    rotation: &Mat3<F>,
+    v: Vec3<F>,
+) -> Vec3<F> {
+    let v = rotation.transpose_mul(v);
+    if !masses::vary(m) {
+        return rotation * symmetric(body.inertia.map(F::k), v);
+    }
+    let mut sum = Vec3::zero();
+    for part in &body.parts {
+        // about the centre that the scene has
+        let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
+        let swing = arm.cross(v.cross(arm));
+        let (mass, inertia) = masses::of_part(m, params, part);
+        let own = swing.scale_add(mass, symmetric(inertia, v));
+        let scale = masses::scale(m, params, part.link);
+        sum = own.scale_add(scale.unwrap_or(F::c(1.0)), sum);
+    }
+    rotation * sum
+}
+
+/// A free body, in MuJoCo's coordinates: velocity of its frame's origin, angular velocity in its own axes.
+#[inline(always)]
+fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize) {
+    let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
+    let (c, d) = (body.coord, body.dof);
+    let (rotation, acceleration) = (b.work.rotation[k], &b.work.acceleration);
+    let (joint_q, rests, joint_qd) = (&mut b.joint_q, &mut b.joint_q_rest, &mut b.joint_qd);
+    let (mut velocity, mut spin, mut linear, mut angular) =
+        (Vec3::zero(), Vec3::zero(), Vec3::zero(), Vec3::zero());
+    for i in 0..3 {
+        velocity[i] = cx.get(&joint_qd[d + i]);
+        spin[i] = cx.get(&joint_qd[d + 3 + i]);
+        linear[i] = acceleration[d + i];
+        angular[i] = acceleration[d + 3 + i];
+    }
+    let arm = rotation * Vec3::constant(body.center);
+    let swing = spin.cross(arm);
+    let origin = velocity - swing;
+    let pull = (linear - angular.cross(arm)) - spin.cross(swing);
+    let origin = pull.scale_add(dt, origin);
+    let own = rotation
+        .transpose_mul(angular)
+        .scale_add(dt, rotation.transpose_mul(spin));
+    for i in 0..3 {
+        add_compensated(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
+    }
+    let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
+    write_quat(cx, joint_q, c + 3, turned);
+    let rotation = quat::matrix(turned);
+    let spin = rotation * own;
+    let velocity = origin + spin.cross(rotation * Vec3::constant(body.center));
+    for i in 0..3 {
+        cx.set(&mut joint_qd[d + i], velocity[i]);
+        cx.set(&mut joint_qd[d + 3 + i], spin[i]);
+    }
+}
+
+/// Writes the quaternion that begins at coordinate `c`.
+#[inline(always)]
+pub(in crate::step) fn write_quat<C: Cx>(
+    cx: &mut C,
+    joint_q: &mut [C::V],
+    c: usize,
+    q: Quat<C::F>,
+) {
+    for i in 0..4 {
+        cx.set(&mut joint_q[c + i], q[i]);
+    }
+}

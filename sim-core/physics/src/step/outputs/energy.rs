@@ -1,0 +1,72 @@
+//! Energy of a world, for output (MuJoCo: `mj_energyVel`, `mj_energyPos`).
+//!
+//! ```text
+//! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c + Σ ½ k (q - rest)²       c a body's centre of mass in the world
+//! ```
+//!
+//! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - point) has all bodies.
+//! What stands still has no part in either, as where MuJoCo fuses static bodies.
+
+use crate::arrays::Array as A;
+use crate::lane::{Cx, Num, Real};
+use crate::math::factor::multiply;
+use crate::step::forces::springs::{pose_stretch, stretch};
+use crate::step::{BlockOf, ConstantsOf, Stage, gravity};
+
+/// Kinetic and potential energy, for output.
+pub struct Energy;
+
+impl Stage for Energy {
+    const READS: &'static [A] = &[
+        A::JointQ,
+        A::JointQd,
+        A::MassMatrix,
+        A::Inertia,
+        A::Reference,
+        A::Arm,
+        A::Params,
+    ];
+    const WRITES: &'static [A] = &[A::KineticEnergy, A::PotentialEnergy];
+
+    #[inline(always)]
+    fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        let gravity = gravity(m, &b.params);
+        let (w, zero) = (&mut b.work, C::F::c(0.0));
+        for (x, qd) in w.start.iter_mut().zip(&b.joint_qd) {
+            *x = cx.get(qd);
+        }
+        multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
+        let mut kinetic = zero;
+        for (qd, momentum) in w.start.iter().zip(&w.joint_force) {
+            kinetic = qd.fma(*momentum, kinetic);
+        }
+        w.kinetic_energy[0] = kinetic * C::F::c(0.5);
+
+        let mut potential = zero;
+        for (k, body) in m.bodies.iter().enumerate() {
+            if body.parent.is_none() {
+                let inertia = &w.inertia[k];
+                let point = w.reference[body.tree] + w.arm[k];
+                let moment = point.scale_add(inertia[0], inertia.first_moment());
+                potential = potential - gravity.dot(moment);
+            }
+        }
+        for spring in &m.springs.joints {
+            let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+            let half = C::F::c(0.5 * spring.stiffness.to_f64());
+            potential = (stretch * half).fma(stretch, potential);
+        }
+        for tendon in &m.springs.tendons {
+            let stretch = stretch(cx, m, b, tendon);
+            let half = C::F::c(0.5 * tendon.stiffness.to_f64());
+            potential = (stretch * half).fma(stretch, potential);
+        }
+        for spring in &m.springs.poses {
+            let half = C::F::c(0.5 * spring.stiffness.to_f64());
+            for stretch in pose_stretch(cx, m, b, spring) {
+                potential = half.fma(stretch.dot(stretch), potential);
+            }
+        }
+        b.work.potential_energy[0] = potential;
+    }
+}
