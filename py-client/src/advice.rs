@@ -1,5 +1,5 @@
 //! What a running simulation is given and is most likely a mistake, and worlds that fault: each is reported once, with the
-//! cure, by `tightloop.advice`.
+//! cure, by `tightloop.checks.advice`.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -218,7 +218,7 @@ impl Advice {
         let frame = Bound::new(py, frame)?;
         let bounds = (description.joint_q_max, description.joint_qd_max);
         let names = description.dof_names.clone();
-        py.import("tightloop.advice")?
+        py.import("tightloop.checks.advice")?
             .getattr("tell_of_faults")?
             .call1((
                 &frame,
@@ -495,6 +495,7 @@ fn of_order(what: &str, world: usize, order: &str, place: usize) -> String {
 #[cold]
 fn warn(py: Python<'_>, problem: &str) -> PyResult<()> {
     // the numbers differ from simulation to simulation, and the mistake is the same
-    let warn = py.import("tightloop.advice")?.getattr("warn_of_values")?;
-    warn.call1((problem,)).map(drop)
+    py.import("tightloop.checks.advice")?
+        .call_method1("warn_of_values", (problem,))
+        .map(drop)
 }

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vulkan_layer import Layer
 
 import tightloop as tl
-from tightloop import advice
+from tightloop.checks import advice
 from tightloop.env import VectorEnv
 
 REPOSITORY = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import tightloop as tl
-from tightloop import advice
+from tightloop.checks import advice
 
 #: Sets the title, clears, recolours by a C1 code, and turns the direction of text.
 CODES = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e"

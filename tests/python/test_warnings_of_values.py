@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop import advice
+from tightloop.checks import advice
 from tightloop.env import VectorEnv
 from tightloop.tasks.reach import FrankaReach
 

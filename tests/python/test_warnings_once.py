@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop import advice
+from tightloop.checks import advice
 from tightloop.env import Observed
 from tightloop.tasks.cartpole import CartPoleBalance
 

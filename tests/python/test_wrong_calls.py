@@ -23,7 +23,7 @@ from public_calls import CALLS
 import tightloop as tl
 from conftest import URDF
 from tightloop import env, view
-from tightloop.signatures import checked_calls
+from tightloop.checks.signatures import checked_calls
 
 #: The fixture with what the callables need.
 world = test_wrong_inputs.world

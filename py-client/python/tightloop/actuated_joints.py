@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from tightloop import checks
-from tightloop.attributes import suggestion
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
 from tightloop.errors import SceneError
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import checks
-from tightloop.checks import Triple, Vector
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Triple, Vector
 from tightloop.entity import Entity
 from tightloop.errors import SceneError
 

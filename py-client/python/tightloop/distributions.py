@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tightloop import checks
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
-from tightloop.signatures import checked_calls
 
 # the daemon has the same limit, which keeps draws within float32
 _MOST = 1e6

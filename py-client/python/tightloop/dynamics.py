@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError
 from tightloop.inputs import reals
 from tightloop.scene import Scene
-from tightloop.signatures import checked_calls
 
 Array = NDArray[np.float64]
 

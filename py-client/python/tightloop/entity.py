@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from tightloop import checks
-from tightloop.attributes import Attributes
-from tightloop.checks import Quaternion, Triple, Vector
-from tightloop.running import Running
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Quaternion, Triple, Vector
+from tightloop.checks.attributes import Attributes
+from tightloop.checks.running import Running
 
 
 class Entity(Attributes):

@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from tightloop.attributes import nearest
+from tightloop.checks.attributes import nearest
 from tightloop.errors import UnknownField
 from tightloop.notebook import frame_html
 

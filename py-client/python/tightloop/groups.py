@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
-from tightloop.signatures import checked_calls
+from tightloop.checks.signatures import checked_calls
 from tightloop.sim import Sim
 
 

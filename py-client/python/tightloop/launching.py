@@ -8,15 +8,17 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
-from tightloop import _core, advice, checks
-from tightloop.attributes import suggestion
+from tightloop import _core
+from tightloop.checks import advice
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError, UnknownDaemon
 from tightloop.groups import Groups
 from tightloop.realtime import RealTime
 from tightloop.realtime import arguments as realtime_arguments
 from tightloop.scene import Scene
-from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 #: How often `attach` looks for a daemon that is still starting [s].

@@ -19,8 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import checks
-from tightloop.attributes import suggestion
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownField
 from tightloop.frames import FAULTED
@@ -30,7 +31,6 @@ from tightloop.optional_imports import optional_import
 from tightloop.planning import check_alike, varying
 from tightloop.rotations import rotations
 from tightloop.scene import Scene
-from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 from tightloop.tangent import Tangent
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from tightloop import _core
 from tightloop.actuated_joints import chosen, gains
-from tightloop.checks import Vector
+from tightloop.checks.arguments import Vector
+from tightloop.checks.signatures import checked_calls
 from tightloop.entity import Entity
 from tightloop.errors import SceneError, UnknownAttribute
 from tightloop.mujoco import position_actuators
-from tightloop.signatures import checked_calls
 
 
 @checked_calls

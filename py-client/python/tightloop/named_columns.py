@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.attributes import nearest
+from tightloop.checks.attributes import nearest
 from tightloop.errors import CommandRefused
 from tightloop.inputs import as_array, real_numbers
 

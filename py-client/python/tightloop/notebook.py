@@ -7,7 +7,7 @@ from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from tightloop.signatures import checked_calls
+from tightloop.checks.signatures import checked_calls
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
 from tightloop._core import Frame
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError, UnknownField
 from tightloop.frames import FrameCopy
 from tightloop.inputs import reals
-from tightloop.signatures import checked_calls
 
 Array = NDArray[Any]
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 #: What worlds may do when a command is late.
 LATE = ("pause", "hold", "stop")

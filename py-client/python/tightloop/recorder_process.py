@@ -10,9 +10,10 @@ import weakref
 from collections.abc import Sequence
 from pathlib import Path
 
-from tightloop import checks, system
+from tightloop import system
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, RecordingError, TightloopWarning
-from tightloop.signatures import checked_calls
 
 _PROGRAM = Path(__file__).with_name("__main__.py")
 # A recorder writes what waits, some milliseconds; a slow disk may take longer [s].

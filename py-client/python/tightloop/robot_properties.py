@@ -9,8 +9,8 @@ from typing import Any, Protocol, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop.attributes import suggestion
-from tightloop.checks import Quaternion, Triple
+from tightloop.checks.arguments import Quaternion, Triple
+from tightloop.checks.attributes import suggestion
 from tightloop.errors import SceneError
 from tightloop.written_arrays import PropertyArray
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
-from tightloop.attributes import suggestion
+from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
 from tightloop.frames import FAULTED, unknown_field
 from tightloop.inputs import real_numbers, switches

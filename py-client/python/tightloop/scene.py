@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, advice, checks, height_fields, mjcf, notebook
+from tightloop import _core, height_fields, mjcf, notebook
 from tightloop.body import Body
-from tightloop.checks import Vector
+from tightloop.checks import advice
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Vector
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError, UrdfError
 from tightloop.file_kinds import instead, not_a_scene_ending
 from tightloop.mujoco_model import MujocoModel
@@ -25,7 +28,6 @@ from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, re
 from tightloop.scene_options import FrictionCombine
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
-from tightloop.signatures import checked_calls
 from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:

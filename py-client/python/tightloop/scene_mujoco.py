@@ -10,8 +10,9 @@ from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tightloop import _core, checks
-from tightloop.checks import Vector
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco import export
 from tightloop.mujoco_model import MujocoModel

@@ -8,12 +8,13 @@ from typing import Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
 
-from tightloop import _core, checks
-from tightloop.attributes import Attributes, suggestion
-from tightloop.checks import Triple, Vector
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Triple, Vector
+from tightloop.checks.attributes import Attributes, suggestion
+from tightloop.checks.running import Running
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
-from tightloop.running import Running
-from tightloop.signatures import checked_calls
 
 Cone = Literal["elliptic", "pyramidal"]
 FrictionCombine = Literal["max", "mean", "min", "product"]

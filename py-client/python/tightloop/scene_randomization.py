@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tightloop import _core, checks
-from tightloop.attributes import nearest, suggestion
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import nearest, suggestion
+from tightloop.checks.signatures import add_hints, checked_calls
 from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
 from tightloop.robot import Robot
 from tightloop.scene_sensors import SceneSensors
-from tightloop.signatures import add_hints, checked_calls
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")

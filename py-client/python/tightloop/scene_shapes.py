@@ -8,10 +8,12 @@ from collections import ChainMap
 from collections.abc import Collection, Container
 from typing import TYPE_CHECKING, Any, cast
 
-from tightloop import _core, checks, height_fields
-from tightloop.attributes import ByName, nearest
+from tightloop import _core, height_fields
 from tightloop.body import Body
-from tightloop.checks import Vector
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Vector
+from tightloop.checks.attributes import ByName, nearest
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
 from tightloop.file_kinds import instead
 from tightloop.mujoco_model import MujocoModel
@@ -28,7 +30,6 @@ from tightloop.shapes import (
     checked_surface,
     with_surface,
 )
-from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

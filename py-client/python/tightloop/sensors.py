@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tightloop.attributes import ByName
-from tightloop.checks import Quaternion, Triple
+from tightloop.checks.arguments import Quaternion, Triple
+from tightloop.checks.attributes import ByName
 
 
 @dataclass(frozen=True)

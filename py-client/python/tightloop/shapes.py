@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, SupportsFloat, TypedDict, cast
 
-from tightloop import checks
-from tightloop.checks import Quaternion, Triple, Vector
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Quaternion, Triple, Vector
+from tightloop.checks.signatures import with_arguments
 from tightloop.errors import SceneError
-from tightloop.signatures import with_arguments
 
 ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "mesh", "hfield"]
 

@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks, keyframes
+from tightloop import _core, keyframes
 from tightloop._core import Frame
-from tightloop.attributes import Attributes, ByName, nearest
 from tightloop.card import KeepsOnGpu
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import Attributes, ByName, nearest
+from tightloop.checks.params_advice import ParamsAdvice
+from tightloop.checks.signatures import checked_calls
 from tightloop.command_arrays import Command, ready_arrays, step_arguments
 from tightloop.companions import Companion, end
 from tightloop.daemon import Daemon
@@ -27,13 +30,11 @@ from tightloop.ik_of_daemon import IkOfDaemon
 from tightloop.inverse_kinematics import IkSolver
 from tightloop.notebook import Shown
 from tightloop.params import Params
-from tightloop.params_advice import ParamsAdvice
 from tightloop.planning import Plans
 from tightloop.rays import CastsRays
 from tightloop.realtime import HasTiming
 from tightloop.recorder_process import Recording
 from tightloop.sensors import slices_by_name
-from tightloop.signatures import checked_calls
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 

@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import checks, named_files, system
+from tightloop import named_files, system
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SnapshotError
-from tightloop.signatures import checked_calls
 from tightloop.whole_files import whole_file
 
 # magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import checks
-from tightloop.attributes import suggestion
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
 from tightloop.height_fields import SAMPLES_MAX
 from tightloop.shapes import Shape, Surface
-from tightloop.signatures import checked_calls
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -10,9 +10,10 @@ import weakref
 from collections.abc import Sequence
 from html import escape
 
-from tightloop import checks, errors, system
+from tightloop import errors, system
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, LaunchError
-from tightloop.signatures import checked_calls
 
 _STOP_SECONDS = 3.0
 

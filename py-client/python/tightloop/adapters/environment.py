@@ -6,8 +6,8 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop import checks
 from tightloop.adapters.spread import SpreadVectorEnv
+from tightloop.checks import arguments as checks
 from tightloop.env import Task, VectorEnv
 from tightloop.errors import ArgumentError
 from tightloop.optional_imports import optional_import

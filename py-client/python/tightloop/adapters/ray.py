@@ -17,16 +17,16 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from tightloop import checks
 from tightloop.adapters.environment import library
 from tightloop.adapters.gathering import ranges
 from tightloop.adapters.shard import Shard
 from tightloop.adapters.shards import Lost
 from tightloop.adapters.spread import SpreadVectorEnv
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.results import OnNan
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError, SimClosed
-from tightloop.signatures import checked_calls
 
 ray = library("ray", install="ray")
 

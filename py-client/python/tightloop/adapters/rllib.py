@@ -15,9 +15,9 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from tightloop.adapters.environment import library
+from tightloop.checks.signatures import checked_calls
 from tightloop.env import Env, Task, VectorEnv
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 registry = library("ray.tune.registry", install="ray[rllib]")
 

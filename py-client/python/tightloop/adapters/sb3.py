@@ -16,8 +16,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
 torch = library("torch", install="torch")

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from tightloop import checks
 from tightloop.adapters.shard import ShardInfo
+from tightloop.checks import arguments as checks
 from tightloop.errors import ArgumentError, DaemonLost, LaunchError, TightloopError
 
 #: Pause after a shard that could not start, so that a broken node is not asked all the time [s].

@@ -13,7 +13,7 @@ from typing import Any
 from gymnasium.vector import AutoresetMode
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
-from tightloop.signatures import checked_calls
+from tightloop.checks.signatures import checked_calls
 
 skrl = library("skrl", install="skrl")
 gymnasium_envs = library("skrl.envs.wrappers.torch.gymnasium_envs", install="skrl")

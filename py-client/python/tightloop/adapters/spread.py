@@ -12,10 +12,11 @@ from gymnasium.vector import VectorEnv as GymVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import checks
 from tightloop.adapters.gathering import cut_off, gather_infos, ranges, seeds_after_restart
 from tightloop.adapters.shard import ShardStart, ShardStep
 from tightloop.adapters.shards import Fleet, Shards
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.episodes import Episodes, check_seeds
 from tightloop.env.registry import make_task
 from tightloop.env.reset_arguments import autoreset_mode_of, reset_mask
@@ -24,7 +25,6 @@ from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.env.vector import Step
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed
-from tightloop.signatures import checked_calls
 
 
 @checked_calls

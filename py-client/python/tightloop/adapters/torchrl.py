@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
-from tightloop.signatures import checked_calls
+from tightloop.checks.signatures import checked_calls
 
 envs = library("torchrl.envs", install="torchrl")
 specs = library("torchrl.data", install="torchrl")

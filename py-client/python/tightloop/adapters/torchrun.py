@@ -13,11 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tightloop import checks, system
+from tightloop import system
 from tightloop.adapters.gathering import ranges
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env import Task, VectorEnv
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 #: Variables that torchrun sets in each process, in the order of `Rank`.
 _VARIABLES = ("RANK", "WORLD_SIZE", "LOCAL_RANK", "LOCAL_WORLD_SIZE")

@@ -10,9 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tightloop.assets.policy import Policy
-from tightloop.attributes import suggestion
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 __all__ = ["ANT", "CARTPOLE", "FR3", "HUMANOID", "POLICIES", "QUADRUPED", "Policy", "policy"]
 

@@ -56,7 +56,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(f"module `tightloop.env` has no attribute `{name}`")
-    from tightloop.attributes import suggestion
+    from tightloop.checks.attributes import suggestion
     from tightloop.errors import UnknownAttribute
 
     raise UnknownAttribute(f"module `tightloop.env` has no attribute `{name}`; {suggestion(name, __all__)}")

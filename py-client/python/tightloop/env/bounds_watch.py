@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import advice
+from tightloop.checks import advice
 from tightloop.env.task import Observed
 
 #: Worlds that are looked at, calls that make a window, and of how many later calls one is looked at.

@@ -12,11 +12,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.commands import Commands
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 
 class Control(Protocol):

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 #: Stream of random numbers of the first disturbance; the next ones follow.
 _STREAM = 16

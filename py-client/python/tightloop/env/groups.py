@@ -6,14 +6,14 @@ from inspect import Parameter, signature
 from typing import Any
 
 import tightloop as tl
-from tightloop import checks
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.registry import make_task
 from tightloop.env.simulation import options_of
 from tightloop.env.task import Task
 from tightloop.env.task_checks import scene_of
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 #: Keyword arguments of `VectorEnv`; all others are the task's.
 _OF_ENVIRONMENTS = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from tightloop.attributes import suggestion
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 
 @checked_calls

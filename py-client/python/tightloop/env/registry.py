@@ -10,11 +10,11 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
-from tightloop.attributes import nearest
+from tightloop.checks.attributes import nearest
+from tightloop.checks.signatures import unknown_argument
 from tightloop.env.controls import Control
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
-from tightloop.signatures import unknown_argument
 
 #: Module and class of each task that comes with tightloop.
 TASKS = {

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.attributes import suggestion
+from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError
 
 #: What happens where a result is NaN in a world that is not faulted.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.attributes import suggestion
+from tightloop.checks.attributes import suggestion
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
 

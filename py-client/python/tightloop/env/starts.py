@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
 from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.task import Task, Worlds

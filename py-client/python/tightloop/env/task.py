@@ -10,8 +10,10 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, checks
-from tightloop.attributes import nearest
+from tightloop import _core
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import nearest
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.controls import Control
 from tightloop.env.disturbances import Push
 from tightloop.env.mirror import Mirror
@@ -19,7 +21,6 @@ from tightloop.env.names import Names
 from tightloop.env.task_members import tell_of_class
 from tightloop.errors import ArgumentError, UnknownAttribute
 from tightloop.scene import Scene
-from tightloop.signatures import checked_calls
 
 #: An array of NumPy, torch or JAX.
 Array = Any

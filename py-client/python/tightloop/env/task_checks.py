@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tightloop import checks
-from tightloop.attributes import suggestion
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
 from tightloop.env.task import Task
 from tightloop.env.task_members import tell_of_attributes
 from tightloop.errors import ArgumentError

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from types import CodeType
 from typing import Any
 
-from tightloop import advice
+from tightloop.checks import advice
 
 #: Members that a Task does not have, and those of it that are most likely meant.
 _MEANT = {

@@ -14,8 +14,10 @@ from gymnasium.vector import VectorEnv as GymVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import advice, checks
-from tightloop.attributes import suggestion
+from tightloop.checks import advice
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
+from tightloop.checks.signatures import checked_calls
 from tightloop.env.actions import Actions
 from tightloop.env.disturbances import Disturbances
 from tightloop.env.episodes import Episodes, check_seeds
@@ -36,7 +38,6 @@ from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
 from tightloop.frames import FAULTED
-from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 Step = tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import advice, cache_files, named_files
+from tightloop import cache_files, named_files
+from tightloop.checks import advice
 from tightloop.errors import SceneError
 from tightloop.file_kinds import instead, kind_of_file
 from tightloop.mujoco import shared_frames, textures

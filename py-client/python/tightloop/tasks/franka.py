@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import tightloop as tl
 from tightloop.assets import FR3
-from tightloop.checks import Vector
+from tightloop.checks.arguments import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError

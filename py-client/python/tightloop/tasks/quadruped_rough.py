@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import tightloop as tl
-from tightloop import checks, terrain
+from tightloop import terrain
+from tightloop.checks import arguments as checks
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Worlds

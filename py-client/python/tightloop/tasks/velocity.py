@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import tightloop as tl
-from tightloop import checks
+from tightloop.checks import arguments as checks
 from tightloop.env.controls import Control
 from tightloop.env.disturbances import Push
 from tightloop.env.mirror import Flip, Mirror

@@ -28,7 +28,7 @@ def __getattr__(name: str) -> Any:
     if home is None:
         if name.startswith("_"):
             raise AttributeError(f"module `tightloop.view` has no attribute `{name}`")
-        from tightloop.attributes import suggestion
+        from tightloop.checks.attributes import suggestion
         from tightloop.errors import UnknownAttribute
 
         raise UnknownAttribute(f"module `tightloop.view` has no attribute `{name}`; {suggestion(name, __all__)}")

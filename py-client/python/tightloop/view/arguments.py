@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tightloop import checks
+from tightloop.checks import arguments as checks
 from tightloop.errors import ArgumentError
 from tightloop.view.cameras import PRESETS, Camera
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import checks
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.signatures import checked_calls
 
 #: Directions from the target to the camera, x forward, z up; "follow" is a "three-quarter" camera that moves along.
 PRESETS = {

@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tightloop import advice, checks
+from tightloop.checks import advice
+from tightloop.checks import arguments as checks
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, DaemonLost, TightloopWarning, WaitTimeout
-from tightloop.signatures import checked_calls
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_camera, check_contacts, check_size, check_worlds
 from tightloop.view.cameras import Camera

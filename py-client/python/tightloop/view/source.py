@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from tightloop import _core, checks
+from tightloop import _core
+from tightloop.checks import arguments as checks
 from tightloop.errors import (
     ArgumentError,
     DaemonLost,

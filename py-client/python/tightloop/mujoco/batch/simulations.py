@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.constants import set_const
@@ -24,7 +25,6 @@ from tightloop.mujoco.batch.selection import Selection
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
 from tightloop.mujoco.batch.stepping import Stepping
 from tightloop.mujoco.batch.views import NamedViews
-from tightloop.signatures import checked_calls
 from tightloop.sim import Sim
 
 Array = NDArray[Any]

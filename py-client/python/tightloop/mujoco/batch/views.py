@@ -8,8 +8,8 @@ from typing import Any
 
 from numpy.typing import DTypeLike, NDArray
 
+from tightloop.checks.signatures import checked_calls
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.signatures import checked_calls
 
 Array = NDArray[Any]
 

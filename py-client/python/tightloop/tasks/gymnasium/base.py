@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import tightloop as tl
+from tightloop.checks.signatures import unknown_argument
 from tightloop.env.controls import ActuatorControl, Control
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 from tightloop.errors import ArgumentError, MissingLibrary
 from tightloop.mujoco import export
-from tightloop.signatures import unknown_argument
 
 #: Keywords of gymnasium's renderer and their defaults; pictures of tightloop have options of their own.
 _RENDERER: dict[str, Any] = {

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tightloop import advice
+from tightloop.checks import advice
 from tightloop.tasks.legged_models.drives import standing_torques, unlimited
 from tightloop.tasks.legged_models.legs import Leg
 from tightloop.tasks.legged_models.pose import sole

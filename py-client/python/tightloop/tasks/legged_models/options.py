@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import checks
-from tightloop.attributes import suggestion
+from tightloop.checks import arguments as checks
+from tightloop.checks.attributes import suggestion
 from tightloop.env.mirror import Flip
 from tightloop.errors import ArgumentError
 from tightloop.tasks.legged import ByJoint

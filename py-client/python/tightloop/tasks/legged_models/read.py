@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tightloop import checks
+from tightloop.checks import arguments as checks
 from tightloop.errors import ArgumentError
 from tightloop.file_kinds import instead, kind_of_file
 from tightloop.scene_options import Solver

@@ -23,7 +23,7 @@ from tightloop.errors import TightloopWarning
 from tightloop.frames import FAULTED
 from tightloop.terminal import printable
 
-_OWN = f"{Path(__file__).parent}{os.sep}"
+_OWN = f"{Path(__file__).parents[1]}{os.sep}"
 #: What explains a command that is not finite: the actions of an environment.
 _SOURCE: ContextVar[Callable[[], tuple[int, str] | None] | None] = ContextVar("_SOURCE", default=None)
 #: Speeds above this say which dof went wrong [rad/s or m/s].

@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-from tightloop import advice
+from tightloop.checks import advice
 
 # How a running simulation is changed instead; {name} is that of the robot or body.
 _PARAM = 'write sim.params.{attribute}, which params=("{attribute}",) at the launch lets vary'

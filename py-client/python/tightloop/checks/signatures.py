@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from tightloop.attributes import nearest
+from tightloop.checks.attributes import nearest
 from tightloop.errors import SignatureError
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import _core, advice
+from tightloop import _core
+from tightloop.checks import advice
 from tightloop.errors import TightloopError
 
 #: Writes that are looked at, and worlds of each: such a mistake is in all of them.
