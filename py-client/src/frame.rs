@@ -56,7 +56,7 @@ impl PyFrame {
             return Ok(array);
         }
         static FRAME_ARRAY: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-        let kind = FRAME_ARRAY.import(py, "tightloop.written_arrays", "FrameArray")?;
+        let kind = FRAME_ARRAY.import(py, "tightloop.arrays.written", "FrameArray")?;
         let array = read_only(sample, &view).call_method1("view", (kind,))?;
         self.arrays()
             .push((name.to_owned(), array.clone().unbind()));
@@ -100,7 +100,7 @@ impl PyFrame {
         for view in sample.get().0.fields() {
             arrays.set_item(view.name, read_only(sample, &view).call_method0("copy")?)?;
         }
-        py.import("tightloop.frames")?
+        py.import("tightloop.arrays.frames")?
             .getattr("FrameCopy")?
             .call1((arrays, sim_daemon::field_names()))
     }
@@ -192,7 +192,7 @@ impl PyFrame {
     #[cold]
     fn unknown(&self, py: Python<'_>, name: &str) -> PyResult<PyErr> {
         let error = py
-            .import("tightloop.frames")?
+            .import("tightloop.arrays.frames")?
             .getattr("unknown_field")?
             .call1((name, self.fields(py), sim_daemon::field_names()))?;
         Ok(PyErr::from_value(error))

@@ -193,7 +193,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
         let (names, worlds) = (axis.names(self.description), self.description.worlds);
         let parts = given
             .py()
-            .import("tightloop.named_columns")?
+            .import("tightloop.arrays.named_columns")?
             .getattr("named_columns")?
             .call((field, given, worlds, names, robots), Some(&more))?;
         self.add_runs(field, &parts)
@@ -280,7 +280,7 @@ impl<'a, 'py> Inputs<'a, 'py> {
         more.set_item("robots", sizes)?;
         let array = value
             .py()
-            .import("tightloop.inputs")?
+            .import("tightloop.arrays.inputs")?
             .getattr("as_array")?
             .call(arguments, Some(&more))?;
         let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
@@ -314,7 +314,7 @@ impl<'py> Mask<'py> {
         };
         let checked = mask
             .py()
-            .import("tightloop.inputs")?
+            .import("tightloop.arrays.inputs")?
             .getattr("as_mask")?
             .call1((name, mask, worlds))?;
         Ok(Mask(Some(
@@ -337,7 +337,7 @@ impl<'py> Seed<'py> {
         };
         let checked = seed
             .py()
-            .import("tightloop.inputs")?
+            .import("tightloop.arrays.inputs")?
             .getattr("as_seed")?
             .call1((seed, worlds))?;
         Ok(Seed(Some(

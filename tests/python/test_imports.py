@@ -30,16 +30,17 @@ LAYERS = (
         "tightloop.checks.advice",
         "tightloop.array_libraries",
         "tightloop.assets",
+        "tightloop.arrays",
         "tightloop.checks",
         "tightloop.checks.attributes",
         "tightloop.cache_files",
         "tightloop.checks.arguments",
         "tightloop.cuda",
         "tightloop.file_kinds",
-        "tightloop.frames",
-        "tightloop.inputs",
+        "tightloop.arrays.frames",
+        "tightloop.arrays.inputs",
         "tightloop.keyframes",
-        "tightloop.named_columns",
+        "tightloop.arrays.named_columns",
         "tightloop.named_files",
         "tightloop.notebook",
         "tightloop.optional_imports",
@@ -47,7 +48,7 @@ LAYERS = (
         "tightloop.checks.signatures",
         "tightloop.system",
         "tightloop.whole_files",
-        "tightloop.written_arrays",
+        "tightloop.arrays.written",
     ),
     ("tightloop._core",),
     ("tightloop.mujoco",),
@@ -137,7 +138,7 @@ def imports_of(source: str, modules: Iterable[str]) -> set[str]:
 
 
 def imports_of_rust(source: str) -> set[str]:
-    """Return the Python modules that a Rust source file imports, as in ``py.import("tightloop.inputs")``."""
+    """Return the Python modules that a Rust source file imports, as in ``py.import("tightloop.arrays.inputs")``."""
     return set(re.findall(r'\.import\("(tightloop[\w.]*)"\)', source))
 
 
@@ -203,7 +204,7 @@ def test_imports_follow_the_order_of_the_layers(graph: Graph) -> None:
 
 
 def test_the_compiled_module_imports_what_its_rust_code_names(graph: Graph) -> None:
-    assert {"tightloop.errors", "tightloop.inputs"} <= graph["tightloop._core"]
+    assert {"tightloop.errors", "tightloop.arrays.inputs"} <= graph["tightloop._core"]
     assert graph["tightloop._core"] <= set(graph), "each name is a module"
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tightloop import assets as assets
     from tightloop import terrain as terrain
     from tightloop._core import Frame, __version__
+    from tightloop.arrays.frames import FrameCopy
     from tightloop.body import Body
     from tightloop.distributions import Normal, Uniform
     from tightloop.dynamics import Dynamics
@@ -52,7 +53,6 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
-    from tightloop.frames import FrameCopy
     from tightloop.groups import Groups
     from tightloop.ik_objectives import Posture, Reach
     from tightloop.inverse_kinematics import IkResult, IkSolver, ik
@@ -105,7 +105,7 @@ _HOMES = {
         "UrdfError",
         "WaitTimeout",
     ),
-    "tightloop.frames": ("FrameCopy",),
+    "tightloop.arrays.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
     "tightloop.ik_objectives": ("Posture", "Reach"),
     "tightloop.inverse_kinematics": ("IkResult", "IkSolver", "ik"),

@@ -7,7 +7,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.frames import FrameCopy
+from tightloop.arrays.frames import FrameCopy
 
 __version__: str
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
+from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError
-from tightloop.inputs import reals
 from tightloop.scene import Scene
 
 Array = NDArray[np.float64]

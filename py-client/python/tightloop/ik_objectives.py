@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.inputs import reals
 
 Array = NDArray[np.float64]
 

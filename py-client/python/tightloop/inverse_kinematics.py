@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, system
+from tightloop.arrays.inputs import whole_seed
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
 from tightloop.ik_objectives import Posture, Reach, rows, unit_quaternions
 from tightloop.ik_of_daemon import IkOfDaemon
-from tightloop.inputs import whole_seed
 from tightloop.scene import Scene
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.inputs import reals
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError
-from tightloop.inputs import reals
 
 
 @checked_calls

@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.frames import FAULTED
+from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownField
-from tightloop.frames import FAULTED
-from tightloop.inputs import reals
 from tightloop.launching import launch
 from tightloop.optional_imports import optional_import
 from tightloop.planning import check_alike, varying

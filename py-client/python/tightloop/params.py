@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop._core import Frame
+from tightloop.arrays.inputs import as_mask, real_numbers
+from tightloop.arrays.named_columns import Runs, named_columns
+from tightloop.arrays.written import PropertyArray
 from tightloop.checks.attributes import nearest
 from tightloop.checks.params_advice import ParamsAdvice
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
-from tightloop.inputs import as_mask, real_numbers
-from tightloop.named_columns import Runs, named_columns
-from tightloop.written_arrays import PropertyArray
 
 #: Values per body or site, of parameters with several.
 PARTS = {

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import rollouts
 from tightloop._core import Frame
+from tightloop.arrays.frames import FrameCopy
+from tightloop.arrays.inputs import as_mask
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, LeaseHeld, SnapshotError
-from tightloop.frames import FrameCopy
-from tightloop.inputs import as_mask
 from tightloop.rollouts import Rollout
 from tightloop.snapshot import Snapshot
 

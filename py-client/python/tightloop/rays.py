@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop._core import Frame
+from tightloop.arrays.frames import FrameCopy
+from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError, UnknownField
-from tightloop.frames import FrameCopy
-from tightloop.inputs import reals
 
 Array = NDArray[Any]
 

@@ -9,10 +9,10 @@ from typing import Any, Protocol, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.written import PropertyArray
 from tightloop.checks.arguments import Quaternion, Triple
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import SceneError
-from tightloop.written_arrays import PropertyArray
 
 #: How an entry was given: by itself, or by a value that is spread over several. A mimic joint follows its leader in the
 #: second case.

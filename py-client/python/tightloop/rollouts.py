@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
+from tightloop.arrays.frames import FAULTED, unknown_field
+from tightloop.arrays.inputs import real_numbers, switches
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
-from tightloop.frames import FAULTED, unknown_field
-from tightloop.inputs import real_numbers, switches
 
 #: Commands of a step.
 _COMMANDS = ("joint_f", "joint_target_q", "joint_target_qd", "ctrl", "mocap_pos", "mocap_quat", "eq_active", "body_f")

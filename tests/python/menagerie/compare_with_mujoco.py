@@ -21,8 +21,8 @@ import numpy as np
 from fetch import MODELS
 from live_model import Live, live, relative
 
+from tightloop.arrays.frames import FAULTED
 from tightloop.errors import SceneError
-from tightloop.frames import FAULTED
 
 WORLDS = 8
 # Relative to the largest acceleration of a world; with contacts the second counts

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from tightloop.arrays.frames import FAULTED
 from tightloop.errors import TightloopWarning
-from tightloop.frames import FAULTED
 from tightloop.terminal import printable
 
 _OWN = f"{Path(__file__).parents[1]}{os.sep}"

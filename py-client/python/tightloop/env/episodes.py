@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
+from tightloop.arrays.inputs import reals, whole_seed
 from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError
-from tightloop.inputs import reals, whole_seed
 
 #: Stream of random numbers for goals.
 _GOALS = 0

@@ -9,13 +9,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.inputs import whole_seed
 from tightloop.checks.signatures import checked_calls
 from tightloop.env.rendering import MODES
 from tightloop.env.results import check_options
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError, SignatureError
-from tightloop.inputs import whole_seed
 
 #: Arguments of environments with many worlds, also as they are mistyped.
 _MANY = {"autoreset_mode", "n_envs", "num_env", "num_envs", "num_worlds", "worlds"}

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.inputs import reals
 from tightloop.checks.signatures import checked_calls
 from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
-from tightloop.inputs import reals
 
 if TYPE_CHECKING:
     from tightloop.env.evaluation import Evaluation

@@ -14,6 +14,7 @@ from gymnasium.vector import VectorEnv as GymVectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from tightloop.arrays.frames import FAULTED
 from tightloop.checks import advice
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
@@ -37,7 +38,6 @@ from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
-from tightloop.frames import FAULTED
 from tightloop.sim import Sim
 
 Step = tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]

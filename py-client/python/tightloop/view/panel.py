@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from tightloop.frames import FAULTED
+from tightloop.arrays.frames import FAULTED
 from tightloop.view.cameras import PRESETS
 from tightloop.view.display_options import DisplayOptions
 from tightloop.view.frame_stream import FrameStream

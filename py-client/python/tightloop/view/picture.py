@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
+from tightloop.arrays.frames import FAULTED
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.frames import FAULTED
 from tightloop.view import cameras, floor, grid, ground
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera

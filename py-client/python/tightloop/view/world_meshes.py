@@ -10,7 +10,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.frames import FAULTED
+from tightloop.arrays.frames import FAULTED
 from tightloop.view import grid, ground
 from tightloop.view.batched_meshes import BatchedMesh, batched_meshes
 from tightloop.view.display_options import DisplayOptions

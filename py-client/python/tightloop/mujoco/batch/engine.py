@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
+from tightloop.arrays.frames import FAULTED
 from tightloop.command_arrays import ready_arrays
-from tightloop.frames import FAULTED
 from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.joints import JointMap

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
+from tightloop.arrays.frames import FAULTED
 from tightloop.errors import ArgumentError
-from tightloop.frames import FAULTED
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.engine import Engine
 from tightloop.mujoco.batch.fields import Fields

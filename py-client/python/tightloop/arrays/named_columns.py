@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.arrays.inputs import as_array, real_numbers
 from tightloop.checks.attributes import nearest
 from tightloop.errors import CommandRefused
-from tightloop.inputs import as_array, real_numbers
 
 #: Neighbouring columns: the first of them, and their values, shape ``(worlds, columns)``.
 Runs = list[tuple[int, NDArray[np.float64]]]

@@ -1,0 +1,1 @@
+"""Arrays of commands, properties and frames: conversion, columns by name, protection from lost writes."""
