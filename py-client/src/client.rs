@@ -24,7 +24,7 @@ pub(crate) struct Client {
     connection: Mutex<Option<Arc<Connection>>>,
     process: u32,
     advice: Advice,
-    /// `tightloop.card.Card`, once frames and commands stay on the GPU.
+    /// `tightloop.gpu.card.Card`, once frames and commands stay on the GPU.
     card: Mutex<Option<Py<PyAny>>>,
 }
 
@@ -66,7 +66,7 @@ impl Client {
         self.waiting(py, |hook| connection.land(hook))
     }
 
-    /// Frames from now on are on this `tightloop.card.Card` too.
+    /// Frames from now on are on this `tightloop.gpu.card.Card` too.
     fn keep_on(&self, card: Py<PyAny>) {
         *self.card.lock().unwrap_or_else(PoisonError::into_inner) = Some(card);
     }

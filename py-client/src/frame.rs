@@ -33,7 +33,7 @@ pub(crate) struct PyFrame {
     // not the frame itself, which keeps the arrays made so far: that would be a circle
     sample: Py<Sample>,
     arrays: Mutex<Made>,
-    /// `tightloop.card.Card`, if the frame is on the card too.
+    /// `tightloop.gpu.card.Card`, if the frame is on the card too.
     card: OnceLock<Py<PyAny>>,
 }
 
@@ -155,7 +155,7 @@ impl PyFrame {
         }
     }
 
-    /// An array of the card, made by a method of `tightloop.card.Card`, which holds on to the sample.
+    /// An array of the card, made by a method of `tightloop.gpu.card.Card`, which holds on to the sample.
     fn on_card<'py>(
         slf: &Bound<'py, Self>,
         name: &str,

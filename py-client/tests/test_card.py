@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop.card import Card, KeepsOnGpu
-from tightloop.cuda import Import
+from tightloop.gpu.card import Card, KeepsOnGpu
+from tightloop.gpu.cuda import Import
 
 WORLDS = 3
 SLOT = 4096
@@ -277,9 +277,9 @@ def test_a_second_card_that_fails_leaves_frames_without_tensors_until_one_succee
             raise problem
         return memory
 
-    monkeypatch.setattr("tightloop.card.array_library", lambda: Library(memory))
-    monkeypatch.setattr("tightloop.card.driver", lambda: None)
-    monkeypatch.setattr("tightloop.card.Import", mapped)
+    monkeypatch.setattr("tightloop.gpu.card.array_library", lambda: Library(memory))
+    monkeypatch.setattr("tightloop.gpu.card.driver", lambda: None)
+    monkeypatch.setattr("tightloop.gpu.card.Import", mapped)
     client = Connection(memory)
     sim = Simulation(client)
     first = sim.keep_on_gpu()

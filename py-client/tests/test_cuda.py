@@ -12,7 +12,7 @@ from unittest.mock import MagicMock, call
 import pytest
 
 import tightloop as tl
-from tightloop.cuda import Import, driver
+from tightloop.gpu.cuda import Import, driver
 
 UUID = bytes(range(16))
 THERE = {"uuid": UUID.hex(), "allocated": 8192, "dedicated": True}

@@ -28,14 +28,15 @@ LAYERS = (
     ("tightloop.errors", "tightloop.terminal"),
     (
         "tightloop.checks.advice",
-        "tightloop.array_libraries",
+        "tightloop.gpu.array_libraries",
         "tightloop.assets",
+        "tightloop.gpu",
         "tightloop.arrays",
         "tightloop.checks",
         "tightloop.checks.attributes",
         "tightloop.cache_files",
         "tightloop.checks.arguments",
-        "tightloop.cuda",
+        "tightloop.gpu.cuda",
         "tightloop.file_kinds",
         "tightloop.arrays.frames",
         "tightloop.arrays.inputs",
@@ -76,7 +77,7 @@ LAYERS = (
     ("tightloop.scene", "tightloop.terrain"),
     # what a running simulation is made of
     (
-        "tightloop.card",
+        "tightloop.gpu.card",
         "tightloop.command_arrays",
         "tightloop.companions",
         "tightloop.daemon",

@@ -63,9 +63,9 @@ def torch(monkeypatch):
 @pytest.fixture
 def mapped(monkeypatch):
     """Imports of memory, all of which succeed."""
-    monkeypatch.setattr("tightloop.card.driver", lambda: None)
-    monkeypatch.setattr("tightloop.card.array_library", lambda: SimpleNamespace(stream=lambda device: 0))
-    monkeypatch.setattr("tightloop.card.Import", Mapped)
+    monkeypatch.setattr("tightloop.gpu.card.driver", lambda: None)
+    monkeypatch.setattr("tightloop.gpu.card.array_library", lambda: SimpleNamespace(stream=lambda device: 0))
+    monkeypatch.setattr("tightloop.gpu.card.Import", Mapped)
     return monkeypatch
 
 
@@ -107,7 +107,7 @@ def test_after_a_second_call_that_fails_later_frames_have_no_tensors_and_say_why
             Mapped(there, descriptors)
             raise tl.GpuMemoryError("cuImportExternalMemory: out of memory (2)")
 
-        failing.setattr("tightloop.card.Import", fail)
+        failing.setattr("tightloop.gpu.card.Import", fail)
         with pytest.raises(tl.GpuMemoryError, match="out of memory"):
             on_gpu.keep_on_gpu()
     for frame in (on_gpu.step(), on_gpu.reset()):

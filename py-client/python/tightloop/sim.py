@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core, keyframes
 from tightloop._core import Frame
-from tightloop.card import KeepsOnGpu
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import Attributes, ByName, nearest
 from tightloop.checks.params_advice import ParamsAdvice
@@ -25,6 +24,7 @@ from tightloop.companions import Companion, end
 from tightloop.daemon import Daemon
 from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
+from tightloop.gpu.card import KeepsOnGpu
 from tightloop.ik_objectives import Posture, Reach
 from tightloop.ik_of_daemon import IkOfDaemon
 from tightloop.inverse_kinematics import IkSolver

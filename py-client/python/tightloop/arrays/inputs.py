@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.array_libraries import gpu_of
 from tightloop.errors import ArgumentError, CommandRefused
+from tightloop.gpu.array_libraries import gpu_of
 
 
 def as_array(

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from tightloop import system
-from tightloop.array_libraries import ArrayLibrary, Torch, array_library, check_array, gpu_of
-from tightloop.cuda import Import, driver
 from tightloop.errors import CommandRefused, GpuMemoryError
+from tightloop.gpu.array_libraries import ArrayLibrary, Torch, array_library, check_array, gpu_of
+from tightloop.gpu.cuda import Import, driver
 
 #: Types of fields, as the daemon and as NumPy name them
 _NUMPY = {"f32": "<f4", "f64": "<f8", "i32": "<i4", "u32": "<u4", "u64": "<u8", "u8": "|u1"}

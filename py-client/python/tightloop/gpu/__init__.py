@@ -1,0 +1,1 @@
+"""Frames and commands in device memory, for torch, CuPy and JAX."""
