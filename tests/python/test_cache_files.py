@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop import cache_files
+from tightloop.files import cache as cache_files
 
 
 @pytest.fixture

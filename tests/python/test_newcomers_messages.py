@@ -294,7 +294,7 @@ def test_there_are_a_hundred_mistakes() -> None:
 
 
 def test_a_robot_without_joints_is_served(tmp_path: Path) -> None:
-    from tightloop.scene_files import scene_of
+    from tightloop.files.scenes import scene_of
 
     (tmp_path / "stone.urdf").write_text('<robot name="stone"><link name="only"/></robot>')
     made = scene_of(tmp_path / "stone.urdf")

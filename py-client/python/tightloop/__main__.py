@@ -30,7 +30,7 @@ def main() -> int:
 
     arguments = sys.argv[1:]
     if arguments[:1] in (["serve"], ["bench"]):
-        from tightloop import scene_files
+        from tightloop.files import scenes as scene_files
 
         arguments = [scene_files.scene_file(argument) for argument in arguments]
     if arguments[:1] == ["inspect"]:
@@ -42,7 +42,7 @@ def main() -> int:
 
 def _with_compiled(arguments: list[str]) -> list[str]:
     """Return the arguments of ``inspect``; if they name an MJCF file, with the model that MuJoCo compiles from it."""
-    from tightloop import scene_files
+    from tightloop.files import scenes as scene_files
 
     for argument in arguments[1:]:
         if scene_files.kind_of(Path(argument)) == "mujoco":

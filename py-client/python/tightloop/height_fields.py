@@ -10,8 +10,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import cache_files, named_files
 from tightloop.errors import SceneError
+from tightloop.files import cache as cache_files
+from tightloop.files import named as named_files
 from tightloop.whole_files import whole_file
 
 #: Most elevations of a field; `sim-core/model/src/geometry/height_field.rs` has the same limit.

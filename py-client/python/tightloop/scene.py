@@ -21,7 +21,7 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError, UrdfError
-from tightloop.file_kinds import instead, not_a_scene_ending
+from tightloop.files.kinds import instead, not_a_scene_ending
 from tightloop.mujoco_model import MujocoModel
 from tightloop.robot import PER_DOF, Robot
 from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model

@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import named_files, system
+from tightloop import system
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SnapshotError
+from tightloop.files import named as named_files
 from tightloop.whole_files import whole_file
 
 # magic, version, checksum, model hash, worlds, values per world, bytes per value; little endian

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import named_files
 from tightloop.errors import ArgumentError
+from tightloop.files import named as named_files
 
 #: Most bytes of a policy.
 _FILE_MAX = 1 << 30

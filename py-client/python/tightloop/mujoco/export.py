@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import cache_files, named_files
 from tightloop.checks import advice
 from tightloop.errors import SceneError
-from tightloop.file_kinds import instead, kind_of_file
+from tightloop.files import cache as cache_files
+from tightloop.files import named as named_files
+from tightloop.files.kinds import instead, kind_of_file
 from tightloop.mujoco import shared_frames, textures
 from tightloop.optional_imports import optional_import
 from tightloop.whole_files import whole_file

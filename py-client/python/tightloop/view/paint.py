@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop import named_files
+from tightloop.files import named as named_files
 
 Color = tuple[int, int, int, int]
 Colors = NDArray[np.uint8]

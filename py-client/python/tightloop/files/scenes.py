@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tightloop.file_kinds import element_of
+from tightloop.files.kinds import element_of
 
 if TYPE_CHECKING:
     from tightloop.scene import Scene
@@ -77,7 +77,7 @@ def scene_file(argument: str) -> str:
     kind = kind_of(Path(argument))
     if kind is None:
         return argument
-    from tightloop import cache_files
+    from tightloop.files import cache as cache_files
 
     with _said():
         text = scene_of(Path(argument)).to_toml()

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tightloop import named_files
+from tightloop.files import named as named_files
 
 # The first element of a robot file begins within so many bytes.
 _HEAD_BYTES = 1 << 16
