@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, height_fields, mjcf, notebook
+from tightloop import _core, height_fields, notebook
 from tightloop.body import Body
 from tightloop.checks import advice
 from tightloop.checks import arguments as checks
@@ -22,9 +22,10 @@ from tightloop.checks.arguments import Vector
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError, UrdfError
 from tightloop.files.kinds import instead, not_a_scene_ending
-from tightloop.mujoco_model import MujocoModel
+from tightloop.mujoco import mjcf
+from tightloop.mujoco.model import MujocoModel
+from tightloop.mujoco.scene_models import HULL_VERTICES, check_options, keep_beside, read_file, read_model
 from tightloop.robot import PER_DOF, Robot
-from tightloop.scene_mujoco import HULL_VERTICES, check_options, keep_beside, read_file, read_model
 from tightloop.scene_options import FrictionCombine
 from tightloop.scene_randomization import SceneRandomization
 from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
     from typing_extensions import Unpack
 
-    from tightloop.scene_mujoco import Model
+    from tightloop.mujoco.scene_models import Model
 
 
 @checked_calls

@@ -16,7 +16,7 @@ from tightloop.checks.attributes import ByName, nearest
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
 from tightloop.files.kinds import instead
-from tightloop.mujoco_model import MujocoModel
+from tightloop.mujoco.model import MujocoModel
 from tightloop.robot import Link, Robot
 from tightloop.scene_options import SceneOptions
 from tightloop.shapes import (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core, keyframes
+from tightloop import _core
 from tightloop._core import Frame
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import Attributes, ByName, nearest
@@ -28,6 +28,7 @@ from tightloop.gpu.card import KeepsOnGpu
 from tightloop.ik_objectives import Posture, Reach
 from tightloop.ik_of_daemon import IkOfDaemon
 from tightloop.inverse_kinematics import IkSolver
+from tightloop.mujoco import keyframes
 from tightloop.notebook import Shown
 from tightloop.params import Params
 from tightloop.planning import Plans

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import tightloop as tl
 from tightloop.demo.scenes import DemoScene
 from tightloop.files.scenes import scene_of
-from tightloop.mujoco_model import MujocoModel
+from tightloop.mujoco.model import MujocoModel
 
 # Part of a joint's range that its target crosses, and of one without limits [rad or m]
 _SHARE, _FREE = 0.25, 0.5

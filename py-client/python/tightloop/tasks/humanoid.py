@@ -34,7 +34,7 @@ from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
 from tightloop.tasks.velocity import CONTROL_DT, VelocityTask, columns
 
 if TYPE_CHECKING:
-    from tightloop.scene_mujoco import Model
+    from tightloop.mujoco.scene_models import Model
 
 SIDES = ("left", "right")
 LEG = {"hip_pitch": -0.3, "hip_roll": 0.0, "hip_yaw": 0.0, "knee": 0.6, "ankle_pitch": -0.3, "ankle_roll": 0.0}

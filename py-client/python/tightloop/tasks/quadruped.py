@@ -30,7 +30,7 @@ from tightloop.tasks.legged import ByJoint, LeggedRobot, RobotOptions
 from tightloop.tasks.velocity import CONTROL_DT, VelocityTask
 
 if TYPE_CHECKING:
-    from tightloop.scene_mujoco import Model
+    from tightloop.mujoco.scene_models import Model
 
 LEGS = ("FL", "FR", "RL", "RR")
 ROBOT = LeggedRobot(

@@ -36,7 +36,7 @@ from tightloop.tasks.quadruped import QuadrupedVelocityFlat
 from tightloop.tasks.velocity import CONTROL_DT, STILL
 
 if TYPE_CHECKING:
-    from tightloop.scene_mujoco import Model
+    from tightloop.mujoco.scene_models import Model
 
 KINDS = ("rough", "slopes", "slopes", "stairs", "stairs", "steps")
 #: The size of the hardest level of each kind; see `tightloop.terrain`.

@@ -28,7 +28,7 @@ from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
 from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
 
 if TYPE_CHECKING:
-    from tightloop.scene_mujoco import Model
+    from tightloop.mujoco.scene_models import Model
 
 LIMIT = 4.0  # of actions
 DT, SUBSTEPS = 1 / 200, 4  # [s, –]

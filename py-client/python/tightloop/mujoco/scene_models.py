@@ -15,7 +15,7 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco import export
-from tightloop.mujoco_model import MujocoModel
+from tightloop.mujoco.model import MujocoModel
 from tightloop.shapes import ORIGIN, UPRIGHT
 from tightloop.whole_files import whole_file
 
