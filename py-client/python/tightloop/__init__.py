@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tightloop import terrain as terrain
     from tightloop._core import Frame, __version__
     from tightloop.arrays.frames import FrameCopy
-    from tightloop.body import Body
-    from tightloop.distributions import Normal, Uniform
     from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
@@ -56,23 +54,25 @@ if TYPE_CHECKING:
     from tightloop.groups import Groups
     from tightloop.ik_objectives import Posture, Reach
     from tightloop.inverse_kinematics import IkResult, IkSolver, ik
-    from tightloop.joint_order import JointOrder
     from tightloop.launching import attach, launch
     from tightloop.linearization import Linearization, linearize
     from tightloop.rays import RayHits
     from tightloop.realtime import RealTime, Timing
-    from tightloop.robot import Link, Robot
     from tightloop.rollouts import Rollout
-    from tightloop.scene import Scene
-    from tightloop.sensors import ContactSensor, Site
-    from tightloop.shapes import Shape, Surface
+    from tightloop.scene.body import Body
+    from tightloop.scene.distributions import Normal, Uniform
+    from tightloop.scene.joint_order import JointOrder
+    from tightloop.scene.robot import Link, Robot
+    from tightloop.scene.scene import Scene
+    from tightloop.scene.sensors import ContactSensor, Site
+    from tightloop.scene.shapes import Shape, Surface
     from tightloop.sim import Sim
     from tightloop.snapshot import Snapshot
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
-    "tightloop.body": ("Body",),
-    "tightloop.distributions": ("Normal", "Uniform"),
+    "tightloop.scene.body": ("Body",),
+    "tightloop.scene.distributions": ("Normal", "Uniform"),
     "tightloop.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
@@ -109,16 +109,16 @@ _HOMES = {
     "tightloop.groups": ("Groups",),
     "tightloop.ik_objectives": ("Posture", "Reach"),
     "tightloop.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
-    "tightloop.joint_order": ("JointOrder",),
+    "tightloop.scene.joint_order": ("JointOrder",),
     "tightloop.launching": ("attach", "launch"),
     "tightloop.linearization": ("Linearization", "linearize"),
     "tightloop.rays": ("RayHits",),
     "tightloop.realtime": ("RealTime", "Timing"),
-    "tightloop.robot": ("Link", "Robot"),
+    "tightloop.scene.robot": ("Link", "Robot"),
     "tightloop.rollouts": ("Rollout",),
-    "tightloop.scene": ("Scene",),
-    "tightloop.sensors": ("ContactSensor", "Site"),
-    "tightloop.shapes": ("Shape", "Surface"),
+    "tightloop.scene.scene": ("Scene",),
+    "tightloop.scene.sensors": ("ContactSensor", "Site"),
+    "tightloop.scene.shapes": ("Shape", "Surface"),
     "tightloop.sim": ("Sim",),
     "tightloop.snapshot": ("Snapshot",),
 }

@@ -12,7 +12,7 @@ from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
 from tightloop.ik_objectives import Posture, Reach, rows, unit_quaternions
 from tightloop.ik_of_daemon import IkOfDaemon
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 Array = NDArray[np.float64]
 Targets = ArrayLike | Mapping[str, ArrayLike] | None

@@ -18,7 +18,7 @@ from tightloop.errors import ArgumentError, UnknownDaemon
 from tightloop.groups import Groups
 from tightloop.realtime import RealTime
 from tightloop.realtime import arguments as realtime_arguments
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 from tightloop.sim import Sim
 
 #: How often `attach` looks for a daemon that is still starting [s].

@@ -30,7 +30,7 @@ from tightloop.launching import launch
 from tightloop.optional_imports import optional_import
 from tightloop.planning import check_alike, varying
 from tightloop.rotations import rotations
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 from tightloop.sim import Sim
 from tightloop.tangent import Tangent
 

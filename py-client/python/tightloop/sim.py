@@ -35,7 +35,7 @@ from tightloop.planning import Plans
 from tightloop.rays import CastsRays
 from tightloop.realtime import HasTiming
 from tightloop.recorder_process import Recording
-from tightloop.sensors import slices_by_name
+from tightloop.scene.sensors import slices_by_name
 from tightloop.snapshot import Snapshot, transfer_file
 from tightloop.viewer_process import Viewer
 

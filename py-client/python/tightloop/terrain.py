@@ -22,13 +22,13 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
-from tightloop.height_fields import SAMPLES_MAX
-from tightloop.shapes import Shape, Surface
+from tightloop.scene.height_fields import SAMPLES_MAX
+from tightloop.scene.shapes import Shape, Surface
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from tightloop.scene import Scene
+    from tightloop.scene.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from tightloop.env.commands import Commands
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 
 class Actions:

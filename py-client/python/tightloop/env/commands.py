@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 
 class Commands:

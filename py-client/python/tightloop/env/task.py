@@ -20,7 +20,7 @@ from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.task_members import tell_of_class
 from tightloop.errors import ArgumentError, UnknownAttribute
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 #: An array of NumPy, torch or JAX.
 Array = Any

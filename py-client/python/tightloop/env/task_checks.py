@@ -14,7 +14,7 @@ from tightloop.env.task import Task
 from tightloop.env.task_members import tell_of_attributes
 from tightloop.errors import ArgumentError
 from tightloop.launching import launch
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 _BY_WORLDS = ("xp", "worlds")
 #: Arguments of the members that an environment calls.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tightloop.files.kinds import element_of
 
 if TYPE_CHECKING:
-    from tightloop.scene import Scene
+    from tightloop.scene.scene import Scene
 
 _ROBOT_ENDINGS = (".urdf", ".xacro")
 # Drives of a robot from URDF follow their targets with this natural frequency [rad/s], critically damped.
@@ -36,7 +36,7 @@ def scene_of(path: Path) -> Scene:
     Raises:
         SceneError: The file cannot be used.
     """
-    from tightloop.scene import Scene
+    from tightloop.scene.scene import Scene
 
     kind = kind_of(path)
     if kind == "mujoco":
@@ -48,7 +48,7 @@ def _driven(path: Path) -> Scene:
     import numpy as np
 
     from tightloop.dynamics import Dynamics
-    from tightloop.scene import Scene
+    from tightloop.scene.scene import Scene
 
     scene = Scene()
     robot = scene.add_urdf(path)

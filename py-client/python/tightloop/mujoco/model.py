@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from tightloop import _core
-from tightloop.actuated_joints import chosen, gains
 from tightloop.checks.arguments import Vector
 from tightloop.checks.signatures import checked_calls
-from tightloop.entity import Entity
 from tightloop.errors import SceneError, UnknownAttribute
 from tightloop.mujoco import position_actuators
+from tightloop.scene.actuated_joints import chosen, gains
+from tightloop.scene.entity import Entity
 
 
 @checked_calls

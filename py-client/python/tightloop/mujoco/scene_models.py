@@ -16,7 +16,7 @@ from tightloop.checks.arguments import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco import export
 from tightloop.mujoco.model import MujocoModel
-from tightloop.shapes import ORIGIN, UPRIGHT
+from tightloop.scene.shapes import ORIGIN, UPRIGHT
 from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:

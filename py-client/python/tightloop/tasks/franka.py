@@ -10,7 +10,7 @@ from tightloop.checks.arguments import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError
-from tightloop.shapes import ORIGIN, Surface
+from tightloop.scene.shapes import ORIGIN, Surface
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10

@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tightloop.distributions import Uniform
 from tightloop.env.controls import ActuatorTarget, Control, JointTarget
 from tightloop.env.mirror import Flip
 from tightloop.env.names import Names
 from tightloop.env.task import Array
-from tightloop.scene import Scene
+from tightloop.scene.distributions import Uniform
+from tightloop.scene.scene import Scene
 
 Place = tuple[float, float, float]
 #: One value for all joints, or values by name or pattern.

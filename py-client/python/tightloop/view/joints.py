@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 from tightloop.view.poses import Array
 
 # Range of a slider for a joint without limits [rad or m].

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tightloop.dynamics import Dynamics
 from tightloop.errors import UnknownField
-from tightloop.robot import Robot
-from tightloop.scene import Scene
+from tightloop.scene.robot import Robot
+from tightloop.scene.scene import Scene
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_size, check_worlds
 from tightloop.view.cameras import Camera

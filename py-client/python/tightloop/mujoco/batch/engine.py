@@ -23,7 +23,7 @@ from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.joints import JointMap
 from tightloop.mujoco.batch.layout import StateLayout
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 from tightloop.sim import Sim
 from tightloop.snapshot import Snapshot
 

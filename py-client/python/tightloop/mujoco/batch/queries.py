@@ -12,7 +12,7 @@ from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
 from tightloop.rays import RayHits, Rays, check_lengths, points
-from tightloop.scene import Scene
+from tightloop.scene.scene import Scene
 
 Array = NDArray[Any]
 

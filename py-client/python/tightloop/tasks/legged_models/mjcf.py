@@ -13,7 +13,7 @@ import numpy as np
 import tightloop as tl
 from tightloop.errors import ArgumentError, SceneError
 from tightloop.mujoco import export
-from tightloop.scene_options import Solver
+from tightloop.scene.options import Solver
 from tightloop.tasks.legged_models.skeleton import Hinge, Source
 
 #: Name of the model in its scenes.

@@ -14,7 +14,7 @@ import numpy as np
 from tightloop.checks import arguments as checks
 from tightloop.errors import ArgumentError
 from tightloop.files.kinds import instead, kind_of_file
-from tightloop.scene_options import Solver
+from tightloop.scene.options import Solver
 from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
 from tightloop.tasks.legged_models import drives as gains
 from tightloop.tasks.legged_models import legs as chains

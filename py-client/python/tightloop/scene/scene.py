@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tightloop import _core, height_fields, notebook
-from tightloop.body import Body
+from tightloop import _core, notebook
 from tightloop.checks import advice
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
@@ -25,10 +24,12 @@ from tightloop.files.kinds import instead, not_a_scene_ending
 from tightloop.mujoco import mjcf
 from tightloop.mujoco.model import MujocoModel
 from tightloop.mujoco.scene_models import HULL_VERTICES, check_options, keep_beside, read_file, read_model
-from tightloop.robot import PER_DOF, Robot
-from tightloop.scene_options import FrictionCombine
-from tightloop.scene_randomization import SceneRandomization
-from tightloop.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
+from tightloop.scene import height_fields
+from tightloop.scene.body import Body
+from tightloop.scene.options import FrictionCombine
+from tightloop.scene.randomization import SceneRandomization
+from tightloop.scene.robot import PER_DOF, Robot
+from tightloop.scene.shapes import ORIGIN, UPRIGHT, Shape, Surface, checked_surface, with_surface
 from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from tightloop import _core
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import nearest, suggestion
 from tightloop.checks.signatures import add_hints, checked_calls
-from tightloop.distributions import Distribution, Normal, Uniform, from_table
 from tightloop.errors import SceneError
-from tightloop.robot import Robot
-from tightloop.scene_sensors import SceneSensors
+from tightloop.scene.add_sensors import SceneSensors
+from tightloop.scene.distributions import Distribution, Normal, Uniform, from_table
+from tightloop.scene.robot import Robot
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")

@@ -8,8 +8,7 @@ from collections import ChainMap
 from collections.abc import Collection, Container
 from typing import TYPE_CHECKING, Any, cast
 
-from tightloop import _core, height_fields
-from tightloop.body import Body
+from tightloop import _core
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
 from tightloop.checks.attributes import ByName, nearest
@@ -17,9 +16,11 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
 from tightloop.files.kinds import instead
 from tightloop.mujoco.model import MujocoModel
-from tightloop.robot import Link, Robot
-from tightloop.scene_options import SceneOptions
-from tightloop.shapes import (
+from tightloop.scene import height_fields
+from tightloop.scene.body import Body
+from tightloop.scene.options import SceneOptions
+from tightloop.scene.robot import Link, Robot
+from tightloop.scene.shapes import (
     ORIGIN,
     UPRIGHT,
     Shape,

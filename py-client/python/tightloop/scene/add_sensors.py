@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from tightloop.body import Body
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
 from tightloop.checks.attributes import ByName
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import SceneError
-from tightloop.robot import Link
-from tightloop.scene_shapes import Collidable, SceneShapes, free_name
-from tightloop.sensors import ContactSensor, HeightScan, Site
-from tightloop.shapes import ORIGIN, UPRIGHT
+from tightloop.scene.add_shapes import Collidable, SceneShapes, free_name
+from tightloop.scene.body import Body
+from tightloop.scene.robot import Link
+from tightloop.scene.sensors import ContactSensor, HeightScan, Site
+from tightloop.scene.shapes import ORIGIN, UPRIGHT
 
 #: Rays of a height scan along each axis, at most.
 RAYS_MAX = 1000

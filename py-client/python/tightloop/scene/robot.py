@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.actuated_joints import chosen, gains
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
-from tightloop.entity import Entity
 from tightloop.errors import SceneError
-from tightloop.joint_order import JointOrder
 from tightloop.notebook import picture_html, table
-from tightloop.robot_properties import Modes, Numbers, PerDof, Positions, position, velocity
+from tightloop.scene.actuated_joints import chosen, gains
+from tightloop.scene.entity import Entity
+from tightloop.scene.joint_order import JointOrder
+from tightloop.scene.robot_properties import Modes, Numbers, PerDof, Positions, position, velocity
 
 
 @checked_calls

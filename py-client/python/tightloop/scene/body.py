@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Triple, Vector
-from tightloop.entity import Entity
 from tightloop.errors import SceneError
+from tightloop.scene.entity import Entity
 
 
 class Body(Entity):

@@ -1,0 +1,1 @@
+"""What users describe: robots, bodies, shapes, sensors, and the options of their scene."""
