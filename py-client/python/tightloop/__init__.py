@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from tightloop import terrain as terrain
     from tightloop._core import Frame, __version__
     from tightloop.arrays.frames import FrameCopy
-    from tightloop.dynamics import Dynamics
     from tightloop.errors import (
         ArgumentError,
         CallInProgress,
@@ -52,13 +51,14 @@ if TYPE_CHECKING:
         WaitTimeout,
     )
     from tightloop.groups import Groups
-    from tightloop.ik_objectives import Posture, Reach
-    from tightloop.inverse_kinematics import IkResult, IkSolver, ik
     from tightloop.launching import attach, launch
-    from tightloop.linearization import Linearization, linearize
+    from tightloop.planning.dynamics import Dynamics
+    from tightloop.planning.ik_objectives import Posture, Reach
+    from tightloop.planning.inverse_kinematics import IkResult, IkSolver, ik
+    from tightloop.planning.linearization import Linearization, linearize
+    from tightloop.planning.rollouts import Rollout
     from tightloop.rays import RayHits
     from tightloop.realtime import RealTime, Timing
-    from tightloop.rollouts import Rollout
     from tightloop.scene.body import Body
     from tightloop.scene.distributions import Normal, Uniform
     from tightloop.scene.joint_order import JointOrder
@@ -73,7 +73,7 @@ _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
     "tightloop.scene.body": ("Body",),
     "tightloop.scene.distributions": ("Normal", "Uniform"),
-    "tightloop.dynamics": ("Dynamics",),
+    "tightloop.planning.dynamics": ("Dynamics",),
     "tightloop.errors": (
         "ArgumentError",
         "CallInProgress",
@@ -107,15 +107,15 @@ _HOMES = {
     ),
     "tightloop.arrays.frames": ("FrameCopy",),
     "tightloop.groups": ("Groups",),
-    "tightloop.ik_objectives": ("Posture", "Reach"),
-    "tightloop.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
+    "tightloop.planning.ik_objectives": ("Posture", "Reach"),
+    "tightloop.planning.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
     "tightloop.scene.joint_order": ("JointOrder",),
     "tightloop.launching": ("attach", "launch"),
-    "tightloop.linearization": ("Linearization", "linearize"),
+    "tightloop.planning.linearization": ("Linearization", "linearize"),
     "tightloop.rays": ("RayHits",),
     "tightloop.realtime": ("RealTime", "Timing"),
     "tightloop.scene.robot": ("Link", "Robot"),
-    "tightloop.rollouts": ("Rollout",),
+    "tightloop.planning.rollouts": ("Rollout",),
     "tightloop.scene.scene": ("Scene",),
     "tightloop.scene.sensors": ("ContactSensor", "Site"),
     "tightloop.scene.shapes": ("Shape", "Surface"),

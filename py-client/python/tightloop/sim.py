@@ -22,16 +22,16 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.command_arrays import Command, ready_arrays, step_arguments
 from tightloop.companions import Companion, end
 from tightloop.daemon import Daemon
-from tightloop.dynamics import Dynamics
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
 from tightloop.gpu.card import KeepsOnGpu
-from tightloop.ik_objectives import Posture, Reach
-from tightloop.ik_of_daemon import IkOfDaemon
-from tightloop.inverse_kinematics import IkSolver
 from tightloop.mujoco import keyframes
 from tightloop.notebook import Shown
 from tightloop.params import Params
-from tightloop.planning import Plans
+from tightloop.planning.dynamics import Dynamics
+from tightloop.planning.ik_objectives import Posture, Reach
+from tightloop.planning.ik_of_daemon import IkOfDaemon
+from tightloop.planning.inverse_kinematics import IkSolver
+from tightloop.planning.plans import Plans
 from tightloop.rays import CastsRays
 from tightloop.realtime import HasTiming
 from tightloop.recorder_process import Recording

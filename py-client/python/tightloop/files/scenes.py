@@ -47,7 +47,7 @@ def scene_of(path: Path) -> Scene:
 def _driven(path: Path) -> Scene:
     import numpy as np
 
-    from tightloop.dynamics import Dynamics
+    from tightloop.planning.dynamics import Dynamics
     from tightloop.scene.scene import Scene
 
     scene = Scene()

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.dynamics import Dynamics
 from tightloop.errors import CommandRefused
+from tightloop.planning.dynamics import Dynamics
 from tightloop.view.poses import Array
 
 # Natural frequency of the spring with the mass that it moves [rad/s]. It is low for 60 frames per second, so that a

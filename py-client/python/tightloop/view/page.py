@@ -9,8 +9,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.dynamics import Dynamics
 from tightloop.errors import TightloopError
+from tightloop.planning.dynamics import Dynamics
 from tightloop.view import floor
 from tightloop.view.aim import Aim
 from tightloop.view.cameras import camera

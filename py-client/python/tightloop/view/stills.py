@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.dynamics import Dynamics
 from tightloop.errors import UnknownField
+from tightloop.planning.dynamics import Dynamics
 from tightloop.scene.robot import Robot
 from tightloop.scene.scene import Scene
 from tightloop.view import dependencies

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.rotations import cross, rotated, rotations
+from tightloop.planning.rotations import cross, rotated, rotations
 
 Array = NDArray[np.float64]
 

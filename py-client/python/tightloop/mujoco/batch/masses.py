@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.rotations import rotations
+from tightloop.planning.rotations import rotations
 
 Array = NDArray[Any]
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import rollouts
 from tightloop._core import Frame
 from tightloop.arrays.frames import FrameCopy
 from tightloop.arrays.inputs import as_mask
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, LeaseHeld, SnapshotError
-from tightloop.rollouts import Rollout
+from tightloop.planning import rollouts
+from tightloop.planning.rollouts import Rollout
 from tightloop.snapshot import Snapshot
 
 

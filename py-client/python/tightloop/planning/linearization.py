@@ -28,11 +28,11 @@ from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownField
 from tightloop.launching import launch
 from tightloop.optional_imports import optional_import
-from tightloop.planning import check_alike, varying
-from tightloop.rotations import rotations
+from tightloop.planning.plans import check_alike, varying
+from tightloop.planning.rotations import rotations
+from tightloop.planning.tangent import Tangent
 from tightloop.scene.scene import Scene
 from tightloop.sim import Sim
-from tightloop.tangent import Tangent
 
 Array = NDArray[np.float64]
 

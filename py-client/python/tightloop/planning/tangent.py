@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.rotations import cross, rotated, rotations
+from tightloop.planning.rotations import cross, rotated, rotations
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.ik_objectives import Posture, Reach, rows, unit_quaternions
-from tightloop.ik_of_daemon import IkOfDaemon
+from tightloop.planning.ik_objectives import Posture, Reach, rows, unit_quaternions
+from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.scene.scene import Scene
 
 Array = NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""Inverse kinematics, dynamics without a simulation, rollouts and linearization."""
