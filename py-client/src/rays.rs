@@ -19,7 +19,7 @@ type Found<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// What rays meet in a scene. `tightloop.rays` wraps it, checks arguments, and chooses geoms.
+/// What rays meet in a scene. `tightloop.sim.rays` wraps it, checks arguments, and chooses geoms.
 #[pyclass(frozen, module = "tightloop._core")]
 pub(crate) struct RayScene(config::RayScene);
 

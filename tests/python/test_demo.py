@@ -178,7 +178,7 @@ opened: list[_Page] = []
 
 
 def test_one_page_follows_all_stops(tmp_path, monkeypatch, capsys):
-    process = pytest.importorskip("tightloop.viewer_process")
+    process = pytest.importorskip("tightloop.sim.viewer_process")
     monkeypatch.setattr(process, "Viewer", _Page)
     names = []
     stops = [Torque(2), Trained(2)]

@@ -230,7 +230,7 @@ def test_the_working_directory_cannot_shadow_what_the_daemon_imports(pendulum, t
 def test_a_daemon_that_ends_before_it_is_ready_says_how(pendulum, tmp_path, monkeypatch, end, told):
     program = tmp_path / "daemon.py"
     program.write_text(f"import os, sys\n{end}")
-    monkeypatch.setattr("tightloop.daemon._PROGRAM", program)
+    monkeypatch.setattr("tightloop.sim.daemon._PROGRAM", program)
     with pytest.raises(tl.LaunchError, match=rf"{told} before it was ready; .*log=FILE"):
         tl.launch(pendulum, worlds=1)
 
@@ -240,7 +240,7 @@ def test_lines_that_a_driver_prints_before_the_daemon_is_ready_are_passed_over(p
     program = tmp_path / "daemon.py"
     said = 'print("driver: hello"); print(7); print({}); sys.stdout.flush()'
     program.write_text(f"import runpy, sys\n{said}\nrunpy.run_path({str(real)!r}, run_name='__main__')")
-    monkeypatch.setattr("tightloop.daemon._PROGRAM", program)
+    monkeypatch.setattr("tightloop.sim.daemon._PROGRAM", program)
     with tl.launch(pendulum, worlds=1) as sim:
         sim.step()
 

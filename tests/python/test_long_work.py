@@ -41,7 +41,7 @@ WORK = {
     "building a scene": (
         1,
         """
-from tightloop.daemon import Daemon
+from tightloop.sim.daemon import Daemon
 cube = '''
 [[body]]
 name = "cubeNUMBER"

@@ -50,15 +50,11 @@ if TYPE_CHECKING:
         UrdfError,
         WaitTimeout,
     )
-    from tightloop.groups import Groups
-    from tightloop.launching import attach, launch
     from tightloop.planning.dynamics import Dynamics
     from tightloop.planning.ik_objectives import Posture, Reach
     from tightloop.planning.inverse_kinematics import IkResult, IkSolver, ik
     from tightloop.planning.linearization import Linearization, linearize
     from tightloop.planning.rollouts import Rollout
-    from tightloop.rays import RayHits
-    from tightloop.realtime import RealTime, Timing
     from tightloop.scene.body import Body
     from tightloop.scene.distributions import Normal, Uniform
     from tightloop.scene.joint_order import JointOrder
@@ -66,8 +62,12 @@ if TYPE_CHECKING:
     from tightloop.scene.scene import Scene
     from tightloop.scene.sensors import ContactSensor, Site
     from tightloop.scene.shapes import Shape, Surface
-    from tightloop.sim import Sim
-    from tightloop.snapshot import Snapshot
+    from tightloop.sim.groups import Groups
+    from tightloop.sim.launching import attach, launch
+    from tightloop.sim.rays import RayHits
+    from tightloop.sim.realtime import RealTime, Timing
+    from tightloop.sim.sim import Sim
+    from tightloop.sim.snapshot import Snapshot
 
 _HOMES = {
     "tightloop._core": ("Frame", "__version__"),
@@ -106,21 +106,21 @@ _HOMES = {
         "WaitTimeout",
     ),
     "tightloop.arrays.frames": ("FrameCopy",),
-    "tightloop.groups": ("Groups",),
+    "tightloop.sim.groups": ("Groups",),
     "tightloop.planning.ik_objectives": ("Posture", "Reach"),
     "tightloop.planning.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
     "tightloop.scene.joint_order": ("JointOrder",),
-    "tightloop.launching": ("attach", "launch"),
+    "tightloop.sim.launching": ("attach", "launch"),
     "tightloop.planning.linearization": ("Linearization", "linearize"),
-    "tightloop.rays": ("RayHits",),
-    "tightloop.realtime": ("RealTime", "Timing"),
+    "tightloop.sim.rays": ("RayHits",),
+    "tightloop.sim.realtime": ("RealTime", "Timing"),
     "tightloop.scene.robot": ("Link", "Robot"),
     "tightloop.planning.rollouts": ("Rollout",),
     "tightloop.scene.scene": ("Scene",),
     "tightloop.scene.sensors": ("ContactSensor", "Site"),
     "tightloop.scene.shapes": ("Shape", "Surface"),
-    "tightloop.sim": ("Sim",),
-    "tightloop.snapshot": ("Snapshot",),
+    "tightloop.sim.sim": ("Sim",),
+    "tightloop.sim.snapshot": ("Snapshot",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -15,7 +15,7 @@ from random_mjcf import EVERYTHING, random_mjcf
 
 import tightloop as tl
 from tightloop import optional_imports
-from tightloop.rays import RayHits
+from tightloop.sim.rays import RayHits
 
 Array = NDArray[Any]
 

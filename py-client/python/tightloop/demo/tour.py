@@ -134,7 +134,7 @@ class _Page:
     def show(self, name: str, worlds: int) -> None:
         """Open the page for the first scene."""
         if self._viewer is None:
-            from tightloop.viewer_process import Viewer
+            from tightloop.sim.viewer_process import Viewer
 
             self._viewer = Viewer(name, port=self._port, worlds=256, open=True)
             print(f"the page is at {self._viewer.url}", flush=True)

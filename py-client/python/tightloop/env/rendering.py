@@ -13,7 +13,7 @@ from tightloop.env.task import Task
 from tightloop.errors import ArgumentError, CommandRefused
 
 if TYPE_CHECKING:
-    from tightloop.sim import Sim
+    from tightloop.sim.sim import Sim
     from tightloop.view.picture import Picture
 
 #: Gymnasium's render modes: a page in the browser, and pictures.

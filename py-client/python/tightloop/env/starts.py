@@ -15,7 +15,7 @@ from tightloop.env.episodes import Episodes
 from tightloop.env.evaluation import Evaluation
 from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError, TightloopWarning
-from tightloop.sim import Sim
+from tightloop.sim.sim import Sim
 
 #: Streams of random numbers: of first levels, and of states at the start.
 _LEVELS, _STATES = 1, 2

@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop.arrays.inputs import reals
 from tightloop.checks.signatures import checked_calls
-from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
+from tightloop.sim.command_arrays import ready_arrays
 
 if TYPE_CHECKING:
     from tightloop.env.evaluation import Evaluation
     from tightloop.env.memory import Memory
     from tightloop.env.starts import Starts
     from tightloop.env.task import Task, Worlds
-    from tightloop.sim import Sim
+    from tightloop.sim.sim import Sim
 
 
 @checked_calls

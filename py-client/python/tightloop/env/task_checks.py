@@ -13,8 +13,8 @@ from tightloop.checks.attributes import suggestion
 from tightloop.env.task import Task
 from tightloop.env.task_members import tell_of_attributes
 from tightloop.errors import ArgumentError
-from tightloop.launching import launch
 from tightloop.scene.scene import Scene
+from tightloop.sim.launching import launch
 
 _BY_WORLDS = ("xp", "worlds")
 #: Arguments of the members that an environment calls.

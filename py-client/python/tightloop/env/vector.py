@@ -38,7 +38,7 @@ from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
-from tightloop.sim import Sim
+from tightloop.sim.sim import Sim
 
 Step = tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import _core
-from tightloop.snapshot import transfer_file
+from tightloop.sim.snapshot import transfer_file
 
 Array = NDArray[np.float64]
 

@@ -24,15 +24,15 @@ from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
-from tightloop.command_arrays import ready_arrays
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownField
-from tightloop.launching import launch
 from tightloop.optional_imports import optional_import
 from tightloop.planning.plans import check_alike, varying
 from tightloop.planning.rotations import rotations
 from tightloop.planning.tangent import Tangent
 from tightloop.scene.scene import Scene
-from tightloop.sim import Sim
+from tightloop.sim.command_arrays import ready_arrays
+from tightloop.sim.launching import launch
+from tightloop.sim.sim import Sim
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, LeaseHeld, SnapshotError
 from tightloop.planning import rollouts
 from tightloop.planning.rollouts import Rollout
-from tightloop.snapshot import Snapshot
+from tightloop.sim.snapshot import Snapshot
 
 
 @checked_calls

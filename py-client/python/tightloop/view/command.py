@@ -103,7 +103,7 @@ def _parsed(arguments: list[str]) -> argparse.Namespace:
 
 
 def _answer(kind: str, message: str) -> None:
-    """Tell `tightloop.viewer_process.Viewer` why there is no page."""
+    """Tell `tightloop.sim.viewer_process.Viewer` why there is no page."""
     print(json.dumps({"error": {"kind": kind, "message": message}}), flush=True)
 
 

@@ -25,7 +25,7 @@ from tightloop.view.source import Live, Recorded, Source, is_recording
 from tightloop.whole_files import place_of
 
 if TYPE_CHECKING:
-    from tightloop.sim import Sim
+    from tightloop.sim.sim import Sim
     from tightloop.view.html import Html
 
 #: Frame fields of a film.

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from tightloop.launching import attach
+from tightloop.sim.launching import attach
 from tightloop.view.live_driver import LiveDriver
 from tightloop.view.player import Player
 from tightloop.view.source import CONTACT_FIELDS, Live, Recorded, is_recording

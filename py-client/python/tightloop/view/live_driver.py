@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import CommandRefused, DaemonLost, TightloopError
-from tightloop.sim import Sim
+from tightloop.sim.sim import Sim
 from tightloop.view.drag_spring import DragSpring
 
 # A step that is later than this restarts the schedule instead of catching up [s].

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from tightloop._core import Frame
 from tightloop.arrays.frames import FAULTED
-from tightloop.command_arrays import ready_arrays
-from tightloop.launching import launch
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.joints import JointMap
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.scene.scene import Scene
-from tightloop.sim import Sim
-from tightloop.snapshot import Snapshot
+from tightloop.sim.command_arrays import ready_arrays
+from tightloop.sim.launching import launch
+from tightloop.sim.sim import Sim
+from tightloop.sim.snapshot import Snapshot
 
 Array = NDArray[Any]
 Mask = NDArray[np.bool_]

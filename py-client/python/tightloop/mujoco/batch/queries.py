@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.rays import RayHits, Rays, check_lengths, points
 from tightloop.scene.scene import Scene
+from tightloop.sim.rays import RayHits, Rays, check_lengths, points
 
 Array = NDArray[Any]
 

@@ -25,7 +25,7 @@ from tightloop.mujoco.batch.selection import Selection
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
 from tightloop.mujoco.batch.stepping import Stepping
 from tightloop.mujoco.batch.views import NamedViews
-from tightloop.sim import Sim
+from tightloop.sim.sim import Sim
 
 Array = NDArray[Any]
 

@@ -15,7 +15,7 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, RecordingError, TightloopWarning
 
-_PROGRAM = Path(__file__).with_name("__main__.py")
+_PROGRAM = Path(__file__).parents[1] / "__main__.py"
 # A recorder writes what waits, some milliseconds; a slow disk may take longer [s].
 _STOP_SECONDS = 30.0
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import Protocol
 
 from tightloop import _core
-from tightloop.daemon import Daemon
+from tightloop.sim.daemon import Daemon
 
 
 class Companion(Protocol):

@@ -13,7 +13,7 @@ from typing import Any
 from tightloop import _core, errors, system
 from tightloop.errors import LaunchError
 
-_PROGRAM = Path(__file__).with_name("__main__.py")
+_PROGRAM = Path(__file__).parents[1] / "__main__.py"
 # A daemon stops within milliseconds; after this time it is killed [s].
 _STOP_SECONDS = 3.0
 # What to do where the system starts no process, by the error number.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.arrays.inputs import as_array, real_numbers, switches
 from tightloop.arrays.named_columns import Runs
 from tightloop.errors import CommandRefused
-from tightloop.params import Params
+from tightloop.sim.params import Params
 
 #: An array ``(worlds, dofs)`` for the whole scene, ``(dofs,)`` for identical commands, or a dict of such by robot,
 #: joint or pattern.

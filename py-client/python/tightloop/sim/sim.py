@@ -19,25 +19,25 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import Attributes, ByName, nearest
 from tightloop.checks.params_advice import ParamsAdvice
 from tightloop.checks.signatures import checked_calls
-from tightloop.command_arrays import Command, ready_arrays, step_arguments
-from tightloop.companions import Companion, end
-from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
 from tightloop.gpu.card import KeepsOnGpu
 from tightloop.mujoco import keyframes
 from tightloop.notebook import Shown
-from tightloop.params import Params
 from tightloop.planning.dynamics import Dynamics
 from tightloop.planning.ik_objectives import Posture, Reach
 from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.planning.inverse_kinematics import IkSolver
 from tightloop.planning.plans import Plans
-from tightloop.rays import CastsRays
-from tightloop.realtime import HasTiming
-from tightloop.recorder_process import Recording
 from tightloop.scene.sensors import slices_by_name
-from tightloop.snapshot import Snapshot, transfer_file
-from tightloop.viewer_process import Viewer
+from tightloop.sim.command_arrays import Command, ready_arrays, step_arguments
+from tightloop.sim.companions import Companion, end
+from tightloop.sim.daemon import Daemon
+from tightloop.sim.params import Params
+from tightloop.sim.rays import CastsRays
+from tightloop.sim.realtime import HasTiming
+from tightloop.sim.recorder_process import Recording
+from tightloop.sim.snapshot import Snapshot, transfer_file
+from tightloop.sim.viewer_process import Viewer
 
 
 @checked_calls
@@ -372,7 +372,7 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
 
     @property
     def params(self) -> Params:
-        """Model parameters that vary between worlds; see `tightloop.params.Params`."""
+        """Model parameters that vary between worlds; see `tightloop.sim.params.Params`."""
         # a new object for each access: a cached one would form a reference cycle with the simulation
         return Params(self._client, self.info, lambda: self.snapshot().numbers, self._params_advice)
 

@@ -13,13 +13,13 @@ from tightloop.checks import advice
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
-from tightloop.daemon import Daemon
 from tightloop.errors import ArgumentError, UnknownDaemon
-from tightloop.groups import Groups
-from tightloop.realtime import RealTime
-from tightloop.realtime import arguments as realtime_arguments
 from tightloop.scene.scene import Scene
-from tightloop.sim import Sim
+from tightloop.sim.daemon import Daemon
+from tightloop.sim.groups import Groups
+from tightloop.sim.realtime import RealTime
+from tightloop.sim.realtime import arguments as realtime_arguments
+from tightloop.sim.sim import Sim
 
 #: How often `attach` looks for a daemon that is still starting [s].
 _ATTACH_SECONDS = 0.02

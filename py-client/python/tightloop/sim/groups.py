@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import overload
 
 from tightloop.checks.signatures import checked_calls
-from tightloop.sim import Sim
+from tightloop.sim.sim import Sim
 
 
 @checked_calls

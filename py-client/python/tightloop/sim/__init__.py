@@ -1,0 +1,1 @@
+"""A running simulation: its start, its connection, and what reads and changes it."""
