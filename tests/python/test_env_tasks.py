@@ -16,7 +16,7 @@ import pytest
 import tightloop as tl
 from tightloop import _core
 from tightloop.env import AutoresetMode, Env, Gripper, JointTorque, Observed, VectorEnv, make_groups
-from tightloop.env.array_pool import ArrayPool
+from tightloop.env.evaluation.array_pool import ArrayPool
 from tightloop.tasks.cartpole import CartPoleBalance
 from tightloop.tasks.reach import FrankaReach
 

@@ -12,8 +12,8 @@ from reference_tasks import PLAIN, any_worlds, one
 from scripted_policies import Lift, PickCube, PushCube
 
 from tightloop.env import VectorEnv, Worlds
-from tightloop.env.array_pool import ArrayPool
-from tightloop.env.observations import ObservationPacker
+from tightloop.env.evaluation.array_pool import ArrayPool
+from tightloop.env.evaluation.observations import ObservationPacker
 from tightloop.env.registry import TASKS
 from tightloop.tasks.franka import CONTROLS
 

@@ -13,7 +13,7 @@ import pytest
 import tightloop as tl
 from conftest import REPOSITORY
 from tightloop.env import Observed, VectorEnv
-from tightloop.env.bounds_watch import BoundsWatch
+from tightloop.env.evaluation.bounds_watch import BoundsWatch
 from tightloop.tasks.cartpole import CartPoleBalance
 
 

@@ -24,7 +24,7 @@ from tightloop.adapters.shards import Lost
 from tightloop.adapters.spread import SpreadVectorEnv
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
-from tightloop.env.results import OnNan
+from tightloop.env.evaluation.results import OnNan
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError, SimClosed
 

@@ -17,11 +17,11 @@ from tightloop.adapters.shard import ShardStart, ShardStep
 from tightloop.adapters.shards import Fleet, Shards
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
-from tightloop.env.episodes import Episodes, check_seeds
+from tightloop.env.episodes.episodes import Episodes, check_seeds
+from tightloop.env.episodes.reset_arguments import autoreset_mode_of, reset_mask
+from tightloop.env.episodes.starts import Starts
+from tightloop.env.evaluation.step_buffers import BufferRing, StepBuffers
 from tightloop.env.registry import make_task
-from tightloop.env.reset_arguments import autoreset_mode_of, reset_mask
-from tightloop.env.starts import Starts
-from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, episode_steps
 from tightloop.env.vector import Step
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed

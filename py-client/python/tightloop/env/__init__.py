@@ -21,7 +21,7 @@ from tightloop.env.controls import (
     JointTarget,
     JointTorque,
 )
-from tightloop.env.disturbances import Push
+from tightloop.env.episodes.disturbances import Push
 from tightloop.env.groups import make_groups
 from tightloop.env.metadata import policy_metadata
 from tightloop.env.mirror import Mirror

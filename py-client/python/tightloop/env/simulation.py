@@ -8,7 +8,7 @@ from typing import Any
 
 import tightloop as tl
 from tightloop.env.controls import Control
-from tightloop.env.disturbances import parameters
+from tightloop.env.episodes.disturbances import parameters
 from tightloop.env.task import Task
 from tightloop.env.task_checks import scene_of
 from tightloop.errors import ArgumentError

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop.arrays.inputs import whole_seed
 from tightloop.checks.signatures import checked_calls
+from tightloop.env.evaluation.results import check_options
 from tightloop.env.rendering import MODES
-from tightloop.env.results import check_options
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError, SignatureError

@@ -15,7 +15,7 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import nearest
 from tightloop.checks.signatures import checked_calls
 from tightloop.env.controls import Control
-from tightloop.env.disturbances import Push
+from tightloop.env.episodes.disturbances import Push
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.task_members import tell_of_class

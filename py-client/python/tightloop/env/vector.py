@@ -20,21 +20,21 @@ from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.env.actions import Actions
-from tightloop.env.disturbances import Disturbances
-from tightloop.env.episodes import Episodes, check_seeds
-from tightloop.env.evaluation import Evaluation
-from tightloop.env.memory import Memory
+from tightloop.env.episodes.disturbances import Disturbances
+from tightloop.env.episodes.episodes import Episodes, check_seeds
+from tightloop.env.episodes.reset_arguments import autoreset_mode_of, reset_mask
+from tightloop.env.episodes.starts import Starts
+from tightloop.env.episodes.states import SettableState
+from tightloop.env.evaluation.evaluation import Evaluation
+from tightloop.env.evaluation.memory import Memory
+from tightloop.env.evaluation.results import TASK_FAULT, OnNan, check_on_nan, refuse
+from tightloop.env.evaluation.step_buffers import BufferRing, StepBuffers
 from tightloop.env.mirror import MirrorColumns
 from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, make_task
 from tightloop.env.rendering import FIELDS, MODES, Rendering, marks
 from tightloop.env.rendering import check as check_mode
-from tightloop.env.reset_arguments import autoreset_mode_of, reset_mask
-from tightloop.env.results import TASK_FAULT, OnNan, check_on_nan, refuse
 from tightloop.env.simulation import open_simulation
-from tightloop.env.starts import Starts
-from tightloop.env.states import SettableState
-from tightloop.env.step_buffers import BufferRing, StepBuffers
 from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute

@@ -18,7 +18,7 @@ import numpy as np
 import tightloop as tl
 from tightloop.checks import arguments as checks
 from tightloop.env.controls import Control
-from tightloop.env.disturbances import Push
+from tightloop.env.episodes.disturbances import Push
 from tightloop.env.mirror import Flip, Mirror
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds

@@ -14,9 +14,9 @@ from tightloop.errors import ArgumentError, CommandRefused, TightloopError
 from tightloop.sim.command_arrays import ready_arrays
 
 if TYPE_CHECKING:
-    from tightloop.env.evaluation import Evaluation
-    from tightloop.env.memory import Memory
-    from tightloop.env.starts import Starts
+    from tightloop.env.episodes.starts import Starts
+    from tightloop.env.evaluation.evaluation import Evaluation
+    from tightloop.env.evaluation.memory import Memory
     from tightloop.env.task import Task, Worlds
     from tightloop.sim.sim import Sim
 

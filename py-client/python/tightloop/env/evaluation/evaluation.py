@@ -9,13 +9,13 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from tightloop.env.array_pool import ArrayPool
-from tightloop.env.bounds_watch import BoundsWatch
+from tightloop.env.evaluation.array_pool import ArrayPool
+from tightloop.env.evaluation.bounds_watch import BoundsWatch
+from tightloop.env.evaluation.observations import ObservationPacker
+from tightloop.env.evaluation.results import check_metric_names
+from tightloop.env.evaluation.reward_terms import RewardTerms
+from tightloop.env.evaluation.step_buffers import aligned
 from tightloop.env.mirror import Mirror, MirrorColumns
-from tightloop.env.observations import ObservationPacker
-from tightloop.env.results import check_metric_names
-from tightloop.env.reward_terms import RewardTerms
-from tightloop.env.step_buffers import aligned
 from tightloop.env.task import Array, Task, Worlds, observed_parts
 from tightloop.errors import ArgumentError
 

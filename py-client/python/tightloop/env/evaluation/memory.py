@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.env.evaluation import Evaluation
+from tightloop.env.evaluation.evaluation import Evaluation
 from tightloop.env.task import Task
 from tightloop.errors import ArgumentError
 

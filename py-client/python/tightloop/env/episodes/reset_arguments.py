@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from tightloop.env.results import check_options
+from tightloop.env.evaluation.results import check_options
 from tightloop.errors import ArgumentError
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tightloop import _core
 from tightloop.checks import arguments as checks
-from tightloop.env.episodes import Episodes
-from tightloop.env.evaluation import Evaluation
+from tightloop.env.episodes.episodes import Episodes
+from tightloop.env.evaluation.evaluation import Evaluation
 from tightloop.env.task import Task, Worlds
 from tightloop.errors import ArgumentError, TightloopWarning
 from tightloop.sim.sim import Sim

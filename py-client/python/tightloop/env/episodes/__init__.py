@@ -1,0 +1,1 @@
+"""Seeds, starts, states and disturbances of episodes."""

@@ -1,0 +1,1 @@
+"""What a task's functions are given and return: observations, rewards, memory and buffers."""
