@@ -19,7 +19,7 @@ from PIL import Image
 import tightloop as tl
 from tightloop.demo import lesson
 from tightloop.view import Camera, Picture
-from tightloop.view.floor import is_floor
+from tightloop.view.meshes.floor import is_floor
 from tightloop.view.parts import Parts, parts
 from tightloop.view.poses import IDENTITY, compose
 

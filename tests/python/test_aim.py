@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.view.aim import Aim
+from tightloop.view.browser.aim import Aim
 from tightloop.view.cameras import Camera, camera, kept
 
 CUBE = np.stack(np.meshgrid([-0.2, 0.2], [-0.2, 0.2], [0.0, 0.4]), axis=-1).reshape(-1, 3)

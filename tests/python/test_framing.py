@@ -16,7 +16,7 @@ import tightloop as tl
 from conftest import URDF
 from tightloop.view import Camera, Film, Picture
 from tightloop.view.framing import Framing
-from tightloop.view.outlines import outline
+from tightloop.view.meshes.outlines import outline
 from tightloop.view.parts import Mesh, Parts, parts
 
 READY = [0.0, -0.6, 0.0, -2.2, 0.0, 1.7, 0.8, 0.03, 0.03]

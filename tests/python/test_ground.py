@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 import tightloop as tl
 from tightloop import terrain
-from tightloop.view import Camera, Picture, floor, ground, guarded_server
-from tightloop.view.display_options import DisplayOptions
+from tightloop.view import Camera, Picture
+from tightloop.view.browser import guarded_server
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.browser.gate import Gate
 from tightloop.view.framing import Framing
-from tightloop.view.gate import Gate
+from tightloop.view.meshes import floor, ground
+from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import Part, Parts, parts
-from tightloop.view.world_meshes import WorldMeshes
 
 STEP = 0.1  # of the hardest stairs [m]
 GROUND = terrain.mixed(("stairs", "rough", "slopes"), levels=2, cell=0.05, border=2.0, hardest={"stairs": STEP})

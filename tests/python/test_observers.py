@@ -16,7 +16,7 @@ import pytest
 
 import tightloop as tl
 from conftest import START, STIFFNESS, URDF
-from tightloop.view.frame_stream import LiveStream
+from tightloop.view.browser.frame_stream import LiveStream
 from tightloop.view.source import CONTACT_FIELDS, FIELDS, Live, Recorded, Shown
 
 EVERYTHING = (*FIELDS, *CONTACT_FIELDS, "joint_qdd", "joint_torque", "bias_force", "body_contact_force")

@@ -18,19 +18,20 @@ import viser
 
 import tightloop as tl
 from processes import alive, started, wait_until
-from tightloop.view import cameras, dependencies, floor, grid
-from tightloop.view.batched_meshes import batched_meshes
+from tightloop.view import cameras, dependencies
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.browser.drag_spring import drag_spring
+from tightloop.view.browser.frame_stream import FIELDS
+from tightloop.view.browser.joints import Joint, at_targets, joints
+from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.player import Player
+from tightloop.view.browser.plots import choices
+from tightloop.view.browser.sliders import Sliders
 from tightloop.view.command import main
-from tightloop.view.display_options import DisplayOptions
-from tightloop.view.drag_spring import drag_spring
-from tightloop.view.frame_stream import FIELDS
-from tightloop.view.joints import Joint, at_targets, joints
-from tightloop.view.live_driver import LiveDriver
+from tightloop.view.meshes import floor, grid
+from tightloop.view.meshes.batched import batched_meshes
 from tightloop.view.parts import Mesh, Part
-from tightloop.view.player import Player
-from tightloop.view.plots import choices
 from tightloop.view.poses import IDENTITY
-from tightloop.view.sliders import Sliders
 from tightloop.view.source import Live
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)

@@ -24,9 +24,10 @@ from websockets.sync.client import connect
 
 import tightloop as tl
 from processes import started, wait_until
-from tightloop.view import Film, guarded_server
+from tightloop.view import Film
+from tightloop.view.browser import guarded_server
+from tightloop.view.browser.gate import Gate, host_name
 from tightloop.view.command import main
-from tightloop.view.gate import Gate, host_name
 
 # What viser's client names, and the server asks for.
 PROTOCOL: Any = f"viser-v{viser.__version__}"

@@ -15,8 +15,9 @@ from sample_meshes import CORNERS, SIZE
 
 from tightloop import _core, optional_imports
 from tightloop.errors import MissingLibrary, SceneError
-from tightloop.view import dependencies, visual_mesh
-from tightloop.view.visual_mesh import VisualMesh
+from tightloop.view import dependencies
+from tightloop.view.meshes import visual as visual_mesh
+from tightloop.view.meshes.visual import VisualMesh
 
 RED, GREEN = [255, 0, 0, 255], [0, 255, 0, 255]
 MTL = "newmtl red\nKd 1 0 0\nnewmtl green\nKd 0 1 0\nd 0.5\n"

@@ -13,7 +13,7 @@ from compare_with_mujoco import File, files
 
 from tightloop import _core
 from tightloop.errors import SceneError
-from tightloop.view import visual_mesh
+from tightloop.view.meshes import visual as visual_mesh
 
 
 def visuals(file: File) -> list[dict]:

@@ -14,7 +14,8 @@ from typing import NoReturn
 from tightloop import system
 from tightloop.errors import TightloopError
 from tightloop.terminal import printable
-from tightloop.view import dependencies, gate
+from tightloop.view import dependencies
+from tightloop.view.browser import gate
 
 _WORLDS_MAX = 1024
 _EPILOG = """examples:
@@ -65,7 +66,7 @@ def main(arguments: list[str]) -> int:
         signal.signal(number, lambda *_: stopped.set())
     try:
         dependencies.check("viser")
-        from tightloop.view.server import Server
+        from tightloop.view.browser.server import Server
 
         # the simulation goes first where there are not enough cores for both
         system.give_way()

@@ -16,8 +16,8 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, DaemonLost, TightloopWarning, WaitTimeout
 from tightloop.view import dependencies
 from tightloop.view.arguments import check_camera, check_contacts, check_size, check_worlds
+from tightloop.view.browser.display_options import Kind
 from tightloop.view.cameras import Camera
-from tightloop.view.display_options import Kind
 from tightloop.view.encoders import Encoder, GifEncoder, Mp4Encoder, PngFile, PngFolder
 from tightloop.view.parts import parts
 from tightloop.view.picture import Picture

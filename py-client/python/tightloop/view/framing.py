@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.view import grid, ground
-from tightloop.view.outlines import outline
+from tightloop.view.meshes import grid, ground
+from tightloop.view.meshes.outlines import outline
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, place, rotate
 from tightloop.view.subject import Subject

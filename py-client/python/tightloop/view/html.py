@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from tightloop.view import guarded_server
+from tightloop.view.browser import guarded_server
+from tightloop.view.browser.display_options import DisplayOptions, Kind
+from tightloop.view.browser.gate import Gate
+from tightloop.view.browser.overlay import Overlay
 from tightloop.view.cameras import Camera, camera
-from tightloop.view.contact_marks import WORLDS_MAX
-from tightloop.view.display_options import DisplayOptions, Kind
-from tightloop.view.gate import Gate
-from tightloop.view.overlay import Overlay
+from tightloop.view.meshes.contact_marks import WORLDS_MAX
+from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS
-from tightloop.view.world_meshes import WorldMeshes
 from tightloop.whole_files import whole_file
 
 # Aspect ratio assumed for the browser's window, which is not known yet.

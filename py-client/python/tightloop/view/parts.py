@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from tightloop import _core
 from tightloop.errors import SceneError
-from tightloop.view import paint, sheets, visual_mesh
+from tightloop.view.meshes import paint, sheets
+from tightloop.view.meshes import visual as visual_mesh
+from tightloop.view.meshes.visual import VisualMesh
 from tightloop.view.subject import Subject, subject
-from tightloop.view.visual_mesh import VisualMesh
 
 # Most files in a note.
 _LISTED_MAX = 8

@@ -14,12 +14,13 @@ from tightloop.arrays.frames import FAULTED
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.view import cameras, floor, grid, ground
+from tightloop.view import cameras
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera
-from tightloop.view.contact_marks import WORLDS_MAX, contact_marks
 from tightloop.view.framing import Framing
-from tightloop.view.goal_markers import goal_marker
+from tightloop.view.meshes import floor, grid, ground
+from tightloop.view.meshes.contact_marks import WORLDS_MAX, contact_marks
+from tightloop.view.meshes.goal_markers import goal_marker
 from tightloop.view.parts import Mesh, Part, Parts
 from tightloop.view.poses import Array, compose
 from tightloop.view.source import CONTACT_FIELDS

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from tightloop.errors import TightloopError
 from tightloop.planning.dynamics import Dynamics
-from tightloop.view import floor
-from tightloop.view.aim import Aim
+from tightloop.view.browser.aim import Aim
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.browser.drag_spring import DragSpring, drag_spring
+from tightloop.view.browser.frame_stream import FEW_WORLDS, FrameStream
+from tightloop.view.browser.joints import Joint, at_targets, joints
+from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.overlay import Overlay
+from tightloop.view.browser.panel import Panel
+from tightloop.view.browser.stage import add_stage
 from tightloop.view.cameras import camera
-from tightloop.view.display_options import DisplayOptions
-from tightloop.view.drag_spring import DragSpring, drag_spring
-from tightloop.view.frame_stream import FEW_WORLDS, FrameStream
-from tightloop.view.joints import Joint, at_targets, joints
-from tightloop.view.live_driver import LiveDriver
-from tightloop.view.overlay import Overlay
-from tightloop.view.panel import Panel
+from tightloop.view.meshes import floor
+from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import parts
 from tightloop.view.poses import Array
 from tightloop.view.source import CONTACT_FIELDS
-from tightloop.view.stage import add_stage
-from tightloop.view.world_meshes import WorldMeshes
 
 # Cameras are re-aimed this often; the points of many worlds take longer to find.
 _KEEP_SECONDS, _KEEP_MANY_SECONDS = 0.03, 0.25

@@ -12,10 +12,10 @@ import viser
 
 from tightloop import system
 from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
-from tightloop.view import guarded_server
-from tightloop.view.frame_stream import FEW_WORLDS, FrameStream, open_stream
-from tightloop.view.gate import Gate
-from tightloop.view.page import Page
+from tightloop.view.browser import guarded_server
+from tightloop.view.browser.frame_stream import FEW_WORLDS, FrameStream, open_stream
+from tightloop.view.browser.gate import Gate
+from tightloop.view.browser.page import Page
 
 # Least time between frames: with few worlds all 60 frames per second are shown, with many worlds every other one.
 _SPACING_SECONDS, _SPACING_MANY_SECONDS = 0.015, 0.025

@@ -9,12 +9,12 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.view.batched_meshes import batched_meshes
-from tightloop.view.contact_marks import contact_marks
-from tightloop.view.display_options import DisplayOptions
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.meshes.batched import batched_meshes
+from tightloop.view.meshes.contact_marks import contact_marks
+from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import Part
 from tightloop.view.poses import Array, wxyz
-from tightloop.view.world_meshes import WorldMeshes
 
 _POINT_COLOR = (250, 190, 30)
 _FORCE_COLOR = (230, 60, 40)

@@ -29,7 +29,7 @@ def height(parts: Iterable[Part], box: Array, ground: Array | None = None) -> fl
     Args:
         parts: Parts of one world.
         box: Bounding box of one world [m], shape ``(2, 3)``.
-        ground: Bounding box of its large height fields [m], from `tightloop.view.ground.extent`.
+        ground: Bounding box of its large height fields [m], from `tightloop.view.meshes.ground.extent`.
     """
     own = [float(part.pose[2]) for part in parts if is_floor(part) and np.isfinite(part.pose[2])]
     # rounding may put the rim of an object below the floor

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from tightloop.sim.launching import attach
-from tightloop.view.live_driver import LiveDriver
-from tightloop.view.player import Player
+from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.player import Player
 from tightloop.view.source import CONTACT_FIELDS, Live, Recorded, is_recording
 
 #: Up to this many worlds are shown at the daemon's rate, more worlds at half of it.

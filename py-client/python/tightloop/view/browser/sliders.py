@@ -8,9 +8,9 @@ from typing import Any
 import viser
 from numpy.typing import NDArray
 
-from tightloop.view.display_options import DisplayOptions
-from tightloop.view.joints import Joint
-from tightloop.view.live_driver import LiveDriver
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.browser.joints import Joint
+from tightloop.view.browser.live_driver import LiveDriver
 
 # Number of steps of a slider over its range.
 _STEPS = 1000

@@ -18,7 +18,7 @@ from websockets.http11 import Request, Response
 
 from tightloop.errors import MissingLibrary
 from tightloop.view import dependencies
-from tightloop.view.gate import Answer, Gate
+from tightloop.view.browser.gate import Answer, Gate
 
 # Messages of a page are controls and cameras, of less than 10 kB. viser itself takes 50 MB.
 _MESSAGE_BYTES_MAX = 1 << 20

@@ -11,11 +11,11 @@ import viser
 from numpy.typing import NDArray
 
 from tightloop.arrays.frames import FAULTED
-from tightloop.view import grid, ground
-from tightloop.view.batched_meshes import BatchedMesh, batched_meshes
-from tightloop.view.display_options import DisplayOptions
-from tightloop.view.floor import is_floor
+from tightloop.view.browser.display_options import DisplayOptions
 from tightloop.view.framing import Framing
+from tightloop.view.meshes import grid, ground
+from tightloop.view.meshes.batched import BatchedMesh, batched_meshes
+from tightloop.view.meshes.floor import is_floor
 from tightloop.view.parts import Part, Parts
 from tightloop.view.poses import IDENTITY, Array, wxyz
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.view import paint
+from tightloop.view.meshes import paint
 
 Color = tuple[int, int, int, int]
 

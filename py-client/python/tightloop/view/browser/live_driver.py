@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tightloop.errors import CommandRefused, DaemonLost, TightloopError
 from tightloop.sim.sim import Sim
-from tightloop.view.drag_spring import DragSpring
+from tightloop.view.browser.drag_spring import DragSpring
 
 # A step that is later than this restarts the schedule instead of catching up [s].
 _LATE_MAX = 0.1

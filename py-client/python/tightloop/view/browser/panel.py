@@ -14,14 +14,14 @@ import numpy as np
 import viser
 
 from tightloop.arrays.frames import FAULTED
+from tightloop.view.browser.display_options import DisplayOptions
+from tightloop.view.browser.frame_stream import FrameStream
+from tightloop.view.browser.joints import Joint
+from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.player import Player
+from tightloop.view.browser.plots import PLOTS_MAX, Plot, choices
+from tightloop.view.browser.sliders import Sliders
 from tightloop.view.cameras import PRESETS
-from tightloop.view.display_options import DisplayOptions
-from tightloop.view.frame_stream import FrameStream
-from tightloop.view.joints import Joint
-from tightloop.view.live_driver import LiveDriver
-from tightloop.view.player import Player
-from tightloop.view.plots import PLOTS_MAX, Plot, choices
-from tightloop.view.sliders import Sliders
 
 SPEEDS = {"0.1×": 0.1, "0.25×": 0.25, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "max": float("inf")}
 _STATUS = {1: "not finite, frozen", 2: "solver out of iterations", 4: "contacts left out", 8: "out of bounds, frozen"}

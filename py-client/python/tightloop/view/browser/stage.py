@@ -7,7 +7,7 @@ import math
 import numpy as np
 import viser
 
-from tightloop.view.floor import spacing
+from tightloop.view.meshes.floor import spacing
 from tightloop.view.poses import Array
 
 # What is behind everything: the floor's tone and the horizon's are 1 % to either side of it.

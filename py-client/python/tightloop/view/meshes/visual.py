@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop import _core
-from tightloop.view import dependencies, paint
-from tightloop.view.paint import Colors
+from tightloop.view import dependencies
+from tightloop.view.meshes import paint
+from tightloop.view.meshes.paint import Colors
 
 
 @dataclass(frozen=True, eq=False)

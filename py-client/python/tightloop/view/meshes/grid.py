@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.view.outlines import outline
+from tightloop.view.meshes.outlines import outline
 from tightloop.view.parts import Part
 from tightloop.view.poses import IDENTITY, Array, place
 

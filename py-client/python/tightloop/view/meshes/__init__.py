@@ -1,0 +1,1 @@
+"""Meshes, marks and ground that pages, pictures and films draw."""
