@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -27,79 +28,23 @@ Graph = dict[str, set[str]]
 LAYERS = (
     ("tightloop.errors", "tightloop.terminal"),
     (
-        "tightloop.checks.advice",
-        "tightloop.gpu.array_libraries",
+        "tightloop.arrays",
         "tightloop.assets",
-        "tightloop.sim",
-        "tightloop.planning",
-        "tightloop.scene",
+        "tightloop.checks",
         "tightloop.files",
         "tightloop.gpu",
-        "tightloop.arrays",
-        "tightloop.checks",
-        "tightloop.checks.attributes",
-        "tightloop.files.cache",
-        "tightloop.checks.arguments",
-        "tightloop.gpu.cuda",
-        "tightloop.files.kinds",
-        "tightloop.arrays.frames",
-        "tightloop.arrays.inputs",
-        "tightloop.mujoco.keyframes",
-        "tightloop.arrays.named_columns",
-        "tightloop.files.named",
         "tightloop.notebook",
         "tightloop.optional_imports",
-        "tightloop.planning.rotations",
-        "tightloop.checks.signatures",
         "tightloop.system",
         "tightloop.whole_files",
-        "tightloop.arrays.written",
     ),
     ("tightloop._core",),
-    ("tightloop.mujoco",),
+    ("tightloop.mujoco", "tightloop.checks.params_advice"),
     # what a scene is made of
-    (
-        "tightloop.scene.actuated_joints",
-        "tightloop.scene.body",
-        "tightloop.scene.distributions",
-        "tightloop.scene.entity",
-        "tightloop.scene.height_fields",
-        "tightloop.scene.joint_order",
-        "tightloop.mujoco.mjcf",
-        "tightloop.mujoco.model",
-        "tightloop.scene.robot",
-        "tightloop.scene.robot_properties",
-        "tightloop.checks.running",
-        "tightloop.mujoco.scene_models",
-        "tightloop.scene.options",
-        "tightloop.scene.randomization",
-        "tightloop.scene.add_sensors",
-        "tightloop.scene.add_shapes",
-        "tightloop.scene.sensors",
-        "tightloop.scene.shapes",
-    ),
+    ("tightloop.scene", "tightloop.mujoco.model", "tightloop.mujoco.scene_models"),
     ("tightloop.scene.scene", "tightloop.terrain"),
     # what a running simulation is made of
-    (
-        "tightloop.gpu.card",
-        "tightloop.sim.command_arrays",
-        "tightloop.sim.companions",
-        "tightloop.sim.daemon",
-        "tightloop.planning.dynamics",
-        "tightloop.planning.ik_objectives",
-        "tightloop.planning.ik_of_daemon",
-        "tightloop.planning.inverse_kinematics",
-        "tightloop.sim.params",
-        "tightloop.checks.params_advice",
-        "tightloop.planning.plans",
-        "tightloop.sim.rays",
-        "tightloop.sim.realtime",
-        "tightloop.sim.recorder_process",
-        "tightloop.planning.rollouts",
-        "tightloop.sim.snapshot",
-        "tightloop.planning.tangent",
-        "tightloop.sim.viewer_process",
-    ),
+    ("tightloop.planning", "tightloop.sim"),
     ("tightloop.sim.sim", "tightloop.sim.groups"),
     ("tightloop.sim.launching",),
     ("tightloop.planning.linearization",),
@@ -115,6 +60,10 @@ LAYERS = (
     ("tightloop.demo",),
     ("tightloop.__main__",),
 )
+
+
+#: A folder with more files hides what belongs together.
+FILES_MAX = 20
 
 
 def modules_of(root: Path) -> dict[str, Path]:
@@ -215,6 +164,11 @@ def test_the_compiled_module_imports_what_its_rust_code_names(graph: Graph) -> N
 
 def test_every_layer_entry_is_a_module(graph: Graph) -> None:
     assert {entry for layer in LAYERS for entry in layer} <= set(graph)
+
+
+def test_folders_of_the_package_hold_at_most_20_files() -> None:
+    files = Counter(file.parent.relative_to(ROOT) for file in modules_of(ROOT).values())
+    assert {str(folder): count for folder, count in files.items() if count > FILES_MAX} == {}
 
 
 def test_the_law_finds_a_circle_inside_functions_and_type_checking() -> None:
