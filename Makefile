@@ -92,14 +92,14 @@ test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libra
 
 # Not part of `test`, which compares 25 worlds.
 test-ray: wheel $(VENV)/.dev ## a Ray cluster of three nodes with 3072 worlds, beside one daemon, and a killed node
-	TIGHTLOOP_RAY_WORLDS=3072 TIGHTLOOP_RAY_STEPS=1000 $(PYTEST) tests/python/test_ray.py
+	TIGHTLOOP_RAY_WORLDS=3072 TIGHTLOOP_RAY_STEPS=1000 $(PYTEST) tests/python/adapters/test_ray.py
 
 train: announce-train wheel $(VENV)/.rl ## train a policy, into out/ppo (TASK=FrankaReach SEED=0 MINUTES=3 RESUME=1 MODEL=robot.urdf)
 	$(PYTHON) examples/ppo.py $(TASK) --seed $(SEED) $(if $(MODEL),--model "$(MODEL)") $(if $(MINUTES),--minutes $(MINUTES)) $(if $(RESUME),--resume)
 
 # Not part of `test`, which runs a few rounds: 200 take half an hour. Set the patience for a machine under load.
 kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUNDS=200 PATIENCE=2)
-	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/test_kill_matrix.py tests/python/test_realtime.py
+	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/daemon/test_kill_matrix.py tests/python/daemon/test_realtime.py
 
 soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
 	$(PYTHON) benches/soak.py --hours $(HOURS)

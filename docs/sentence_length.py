@@ -5,7 +5,7 @@
 Prints the number of sentences, their mean and 95th percentile length in words, then every sentence of more than 25
 words. Code blocks, tables, headings, comments, API directives and generated parts do not count. Inline code counts as
 one word.
-``tests/python/test_prose.py`` holds README.md and docs/pages to a limit.
+``tests/python/docs/test_prose.py`` holds README.md and docs/pages to a limit.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ BENCHES = {
 
 - Both sides use one model, one time step, one solver and the same commands.
 - Over the 3 s of the target demo, tightloop stays within 2·10⁻⁶ rad of MuJoCo. Rounding MuJoCo's own state to float32
-  moves it as far. `tests/python/test_newton_lesson.py` checks this.
+  moves it as far. `tests/python/docs/test_newton_lesson.py` checks this.
 """,
         {
             "demo": "demo",

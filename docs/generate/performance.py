@@ -2,7 +2,7 @@
 
     cd docs && python -m generate.performance     # rewrites docs/pages/performance.md and the table of README.md
 
-Both files are committed, so that a forge shows them. ``tests/python/test_prose.py`` holds them to the results.
+Both files are committed, so that a forge shows them. ``tests/python/docs/test_prose.py`` holds them to the results.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
     python tests/packaging/pythons.py .venv/wheels          # `make packages`; needs a package index for NumPy
 
-It looks for ``python3.N`` on the path and in pyenv's folder. ``tests/python/test_wheel.py`` has the short version.
+It looks for ``python3.N`` on the path and in pyenv's folder. The short version is
+``tests/python/package/test_wheel.py``.
 """
 
 from __future__ import annotations

@@ -20,6 +20,8 @@ from tightloop.checks import advice
 from tightloop.env import VectorEnv
 
 REPOSITORY = Path(__file__).parents[2]
+# MuJoCo models and recordings beside a checkout, where there are any
+SHARED = REPOSITORY.parent / "shared/reference"
 URDF = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"
 
 # The lesson's start state and drives, float32 values as the recorded reference has them

@@ -14,7 +14,7 @@ import pytest
 from tightloop.env import VectorEnv, Worlds
 from tightloop.env.registry import TASKS
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "python")]
+sys.path[:0] = [str(Path(__file__).parents[1] / "python/tasks")]
 from reference_tasks import any_worlds  # noqa: E402  (tests are no package)
 
 WORLDS = 1024

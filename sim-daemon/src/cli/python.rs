@@ -1,5 +1,5 @@
 //! Commands that the Python package runs before this command line sees them. They are here for help, completions and
-//! manual pages. Without the Python package they end with an error. tests/python/test_shells.py compares both.
+//! manual pages. Without the Python package they end with an error. tests/python/command_line/test_shells.py compares both.
 
 use std::net::IpAddr;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! A capsule and a box where one is a geom of MuJoCo's: `tests/python/mujoco/test_closed_forms.py` compares with MuJoCo in
+//! A capsule and a box where one is a geom of MuJoCo's: `tests/python/mujoco/contacts/test_closed_forms.py` compares with MuJoCo in
 //! double precision, and these tests the other backends with that.
 
 use super::shapes::*;

@@ -11,7 +11,7 @@ import pytest
 
 import tightloop as tl
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 URDF = ROOT / "examples/assets/fr3/fr3_franka_hand.urdf"
 WORLDS = 130
 

@@ -6,7 +6,7 @@ from public_call import Call
 
 from tightloop import env, view
 
-STATES = "this task defines no states: tests/python/mujoco/test_gymnasium_tasks.py has one that does"
+STATES = "this task defines no states: tests/python/tasks/test_gymnasium_tasks.py has one that does"
 ENV_CALLS: dict[str, Call] = {
     "VectorEnv": Call(
         lambda _: env.VectorEnv,

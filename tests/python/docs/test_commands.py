@@ -36,7 +36,7 @@ cargo nextest run --release -p sim-picture no_test_has_this_name
 cargo run --release --example nothing; target/release/examples/nothing 3
 .venv/bin/python -m tightloop.nothing serve &
 python -m pytest tests/python/test_nothing.py
-python -m pytest tests/python/test_commands.py::test_nothing -k nothing_of_that_name_either
+python -m pytest tests/python/docs/test_commands.py::test_nothing -k nothing_of_that_name_either
 python examples/nothing.py --flag \\
   tests/nothing/
 tightloop swerve scene.toml | tightloop serve scene.toml --wolds 3
@@ -54,7 +54,7 @@ WRONG = [
     "nothing builds target/release/examples/nothing",
     "no module tightloop.nothing",
     "no file tests/python/test_nothing.py",
-    "no test test_nothing in tests/python/test_commands.py",
+    "no test test_nothing in tests/python/docs/test_commands.py",
     "no Python test nothing_of_that_name_either",
     "no file examples/nothing.py",
     "no file tests/nothing/",
@@ -63,7 +63,8 @@ WRONG = [
 ]
 GOOD = """
 `make demo WORLDS=256` and `make check test`, `cargo nextest run --release --test params velocities`, `tightloop list`,
-`.venv/bin/python -m pytest tests/python/test_commands.py::test_wrong_commands_are_found`, `TIGHTLOOP_FUZZ=9 make test`.
+`.venv/bin/python -m pytest tests/python/docs/test_commands.py::test_wrong_commands_are_found`,
+`TIGHTLOOP_FUZZ=9 make test`.
 """
 WORKFLOW = """
         target: [test, publish]

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 import sample_meshes as looks
 from PIL import Image
-from test_reference import SHARED
 
 import tightloop as tl
-from conftest import URDF
+from conftest import SHARED, URDF
 from tightloop import _core
 from tightloop.view.parts import Part, Parts, parts
 

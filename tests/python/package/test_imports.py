@@ -127,7 +127,7 @@ def layer_of(module: str, layers: tuple[tuple[str, ...], ...]) -> int:
         if package in level:
             return level[package]
         package = package.rpartition(".")[0]
-    raise KeyError(f"`{module}` is in no layer of tests/python/test_imports.py; add it to LAYERS")
+    raise KeyError(f"`{module}` is in no layer of tests/python/package/test_imports.py; add it to LAYERS")
 
 
 def upward_imports(graph: Mapping[str, set[str]], layers: tuple[tuple[str, ...], ...]) -> list[str]:

@@ -19,8 +19,8 @@ from conftest import REPOSITORY
 
 RELEASE = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "release"
 EXAMPLE = REPOSITORY / "examples/c_client/client.c"
-MISTAKES = REPOSITORY / "tests/python/c_client/mistakes.c"
-ALLOCATIONS = REPOSITORY / "tests/python/c_client/allocations.c"
+MISTAKES = REPOSITORY / "tests/python/daemon/c_client/mistakes.c"
+ALLOCATIONS = REPOSITORY / "tests/python/daemon/c_client/allocations.c"
 STRICT = ["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 
 
@@ -107,7 +107,7 @@ def test_a_step_in_c_takes_memory_only_for_the_loan_of_the_transport(pendulum, t
 
 
 def test_a_step_in_c_holds_up_no_other_thread_and_no_forked_child(pendulum, tmp_path):
-    program = compiled(REPOSITORY / "tests/python/c_client/threads.c", tmp_path, "-pthread")
+    program = compiled(REPOSITORY / "tests/python/daemon/c_client/threads.c", tmp_path, "-pthread")
     with tl.launch(pendulum, worlds=3) as sim:
         sim.release()
         try:

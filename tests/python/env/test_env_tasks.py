@@ -20,7 +20,7 @@ from tightloop.env.evaluation.array_pool import ArrayPool
 from tightloop.tasks.cartpole import CartPoleBalance
 from tightloop.tasks.reach import FrankaReach
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[3]
 
 
 def test_gymnasium_finds_them_as_readme_says() -> None:

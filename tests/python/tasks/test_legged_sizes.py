@@ -14,7 +14,7 @@ import tightloop as tl
 from tightloop.assets import QUADRUPED
 from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "examples"))
 
 from training_watch import TermWatch, nothing_learnt
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_reference import FRAMES, SHARED, recorded
+from test_reference import FRAMES, recorded
 
 import tightloop as tl
-from conftest import REPOSITORY
+from conftest import REPOSITORY, SHARED
 
 FIELDS = ("joint_q", "contact_count", "contact_distance")
 OWN = REPOSITORY / "examples/assets/fr3/fr3_franka_hand.urdf"

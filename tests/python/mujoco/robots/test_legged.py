@@ -15,7 +15,7 @@ from test_every_joint import off
 
 import tightloop as tl
 
-sys.path.append(str(Path(__file__).parents[3] / "benches"))
+sys.path.append(str(Path(__file__).parents[4] / "benches"))
 from legged import CASES, Case, rival_of, scene_of
 
 WORLDS = 32

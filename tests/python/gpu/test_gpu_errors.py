@@ -15,7 +15,7 @@ import pytest
 
 import tightloop as tl
 
-URDF = Path(__file__).parents[2] / "examples/assets/fr3/fr3_franka_hand.urdf"
+URDF = Path(__file__).parents[3] / "examples/assets/fr3/fr3_franka_hand.urdf"
 # What the loader of Vulkan calls it now, and did before
 NO_DRIVER = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
 

@@ -285,7 +285,7 @@ CALLS: dict[str, Call] = {
         {},
         dict.fromkeys(
             ("sim", "worlds", "controls", "commands", "states", "planner"),
-            "forms of its own: tests/python/mujoco/test_linearize.py tries them",
+            "forms of its own: tests/python/mujoco/models/test_linearize.py tries them",
         ),
     ),
     "Params.write": Call(

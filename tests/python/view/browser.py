@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium"
 # Screenshots are kept: test output for people.
-SHOTS = Path(__file__).parents[2] / "out" / "viewer"
+SHOTS = Path(__file__).parents[3] / "out" / "viewer"
 # Its software renderer needs seconds for a picture where other programs have the cores.
 PATIENCE_SECONDS = 120.0
 # What viser 1.1.1 itself makes Chromium say when something is dragged; it does no harm.

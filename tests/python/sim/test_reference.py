@@ -15,9 +15,8 @@ import pytest
 from numpy.typing import NDArray
 
 import tightloop as tl
-from conftest import REPOSITORY
+from conftest import REPOSITORY, SHARED
 
-SHARED = REPOSITORY.parent / "shared/reference"
 FRAMES = 180
 
 
