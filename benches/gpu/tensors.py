@@ -1,6 +1,6 @@
 """Tensors on the GPU beside NumPy views: the same bits, the same worlds, and the time of a frame both ways.
 
-    python benches/gpu/tensors.py --worlds 1024,4096,16384 --csv FILE
+    python -m benches tensors --worlds 1024,4096,16384 --csv FILE
 
 Needs an NVIDIA GPU, its driver, torch and cuda-bindings. First it checks that each field of a frame is the same bit for
 bit on the GPU and here, while frames are held and dropped, and that targets by tensor and by array lead to the same

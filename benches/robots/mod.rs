@@ -1,5 +1,5 @@
 //! Floating robots without contacts, each joint driven to a target that swings about the middle of its
-//! range; benches/legged.py is the same in Python, with a swing of each world's own.
+//! range; benches/physics/legged.py is the same in Python, with a swing of each world's own.
 #![allow(dead_code)] // each bench uses its part
 
 use sim_model::{Description, JointKind, Robot, UrdfOptions};

@@ -362,7 +362,7 @@ machines were busy.
     ),
     "gpu_peers": Bench(
         "Other engines on a GPU",
-        """`benches/gpu/peers.py` runs scenes of the GPU backend's table in MuJoCo-Warp and MJX, where they are
+        """`benches/gpu/gpu_peers.py` runs scenes of the GPU backend's table in MuJoCo-Warp and MJX, where they are
 installed.
 
 - The same: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0.

@@ -119,7 +119,7 @@ def test_a_step_in_c_holds_up_no_other_thread_and_no_forked_child(pendulum, tmp_
 
 def test_a_frame_in_c_says_when_the_next_one_is_due(pendulum, tmp_path):
     pendulum.dt, pendulum.substeps = 1e-3, 1
-    program = compiled(REPOSITORY / "benches/realtime.c", tmp_path)
+    program = compiled(REPOSITORY / "benches/daemon/realtime.c", tmp_path)
     with tl.launch(pendulum, worlds=1, realtime=1.0) as sim:
         sim.release()
         done = run(program, sim.name, "1")

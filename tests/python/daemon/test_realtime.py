@@ -1,4 +1,4 @@
-"""Simulations that keep to real time. No test asks how late a frame is: that is for `benches/realtime.py`."""
+"""Simulations that keep to real time. No test asks how late a frame is: that is for `benches/daemon/realtime.py`."""
 
 from __future__ import annotations
 

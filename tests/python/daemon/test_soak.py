@@ -10,7 +10,7 @@ from conftest import REPOSITORY
 
 def test_nothing_grows():
     process = subprocess.run(
-        [sys.executable, "benches/soak.py", "--hours=0.008", "--dry-run"],
+        [sys.executable, "-m", "benches", "soak", "--hours=0.008", "--dry-run"],
         cwd=REPOSITORY,
         capture_output=True,
         text=True,

@@ -194,6 +194,9 @@ def python_errors(words: list[str]) -> Iterator[str]:
             yield f"no module {words[1]}"
         if words[1] == "tightloop":
             yield from tightloop_errors(words[2:])
+    if words[:2] == ["-m", "benches"]:
+        named = [word for word in words[2:3] if not is_placeholder(word)]
+        yield from (f"no bench {name}" for name in named if not list((REPOSITORY / "benches").glob(f"*/{name}.py")))
     for word in words:
         path, _, test = word.partition("::")
         if test and (REPOSITORY / path).exists() and f"def {test}(" not in (REPOSITORY / path).read_text():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import named_commands
@@ -37,6 +38,7 @@ cargo run --release --example nothing; target/release/examples/nothing 3
 .venv/bin/python -m tightloop.nothing serve &
 python -m pytest tests/python/test_nothing.py
 python -m pytest tests/python/docs/test_commands.py::test_nothing -k nothing_of_that_name_either
+python -m benches nothing --rounds 3
 python examples/nothing.py --flag \\
   tests/nothing/
 tightloop swerve scene.toml | tightloop serve scene.toml --wolds 3
@@ -56,6 +58,7 @@ WRONG = [
     "no file tests/python/test_nothing.py",
     "no test test_nothing in tests/python/docs/test_commands.py",
     "no Python test nothing_of_that_name_either",
+    "no bench nothing",
     "no file examples/nothing.py",
     "no file tests/nothing/",
     "no command tightloop swerve",
@@ -64,7 +67,7 @@ WRONG = [
 GOOD = """
 `make demo WORLDS=256` and `make check test`, `cargo nextest run --release --test params velocities`, `tightloop list`,
 `.venv/bin/python -m pytest tests/python/docs/test_commands.py::test_wrong_commands_are_found`,
-`TIGHTLOOP_FUZZ=9 make test`.
+`python -m benches round_trip`, `TIGHTLOOP_FUZZ=9 make test`.
 """
 WORKFLOW = """
         target: [test, publish]
@@ -78,8 +81,36 @@ def test_wrong_commands_are_found(monkeypatch):
     monkeypatch.setattr(named_commands, "sources", lambda ending: own if ending == ".py" else sources(ending))
     _, errors = errors_of("BAD.md", BAD)
     assert sorted(errors) == sorted(f"BAD.md: {error}" for error in WRONG)
-    assert errors_of("GOOD.md", GOOD) == (6, [])
+    assert errors_of("GOOD.md", GOOD) == (7, [])
     assert errors_of("w.yml", WORKFLOW)[1] == ["w.yml: no make target all", "w.yml: no make target publish"]
+
+
+def run_benches(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "benches", *words]
+    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+
+
+def test_each_bench_that_the_makefile_runs_is_listed_with_what_it_measures():
+    listed = dict(re.findall(r"^  (\w+) +(\S.+)$", run_benches().stdout, re.MULTILINE))
+    named = set(re.findall(r"-m benches (\w+)", makefile()))
+    assert len(named) > 10 and named <= set(listed)
+    # each has a file of its own, and parts of benches are not listed
+    assert all(len(list((REPOSITORY / "benches").glob(f"*/{name}.py"))) == 1 for name in listed)
+    assert "ik" in listed and "ik_side" not in listed
+
+
+def test_a_bench_gets_its_arguments_and_ends_as_by_its_path():
+    by_path = [sys.executable, "benches/daemon/picture.py", "--rounds", "no"]
+    alone = subprocess.run(by_path, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    done = run_benches("picture", "--rounds", "no")
+    assert (done.returncode, done.stderr) == (alone.returncode, alone.stderr)
+    assert done.returncode == 2 and "invalid int value: 'no'" in done.stderr
+
+
+def test_a_bench_that_does_not_exist_is_refused_with_the_nearest_names():
+    refused = run_benches("round_trp")
+    assert (refused.returncode, refused.stderr) == (2, "no bench is called `round_trp`; nearest: round_trip\n")
+    assert run_benches("zzz").stderr == "no bench is called `zzz`; `python -m benches` lists all\n"
 
 
 def test_links_between_files_of_the_root_lead_somewhere():

@@ -216,9 +216,9 @@ def test_the_profile_fails_if_the_bench_does(card: Path, tmp_path: Path):
 
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """benches/gpu/peers.py."""
+    """benches/gpu/gpu_peers.py."""
     monkeypatch.setattr(sys, "path", list(sys.path))
-    spec = importlib.util.spec_from_file_location("gpu_peers", REPOSITORY / "benches/gpu/peers.py")
+    spec = importlib.util.spec_from_file_location("gpu_peers", REPOSITORY / "benches/gpu/gpu_peers.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

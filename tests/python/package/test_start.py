@@ -1,4 +1,4 @@
-"""The import of tightloop is fast, because it loads only what is used; `benches/newcomer_start.py` has the rest."""
+"""The import of tightloop is fast, because it loads only what is used; the bench `newcomer_start` has the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robots of benches/legged.py are the same in MuJoCo: what is compared there is the same work."""
+"""The robots of benches/physics/legged.py are the same in MuJoCo: what is compared there is the same work."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from test_every_joint import off
 
 import tightloop as tl
 
-sys.path.append(str(Path(__file__).parents[4] / "benches"))
+sys.path.append(str(Path(__file__).parents[4] / "benches/physics"))
 from legged import CASES, Case, rival_of, scene_of
 
 WORLDS = 32
