@@ -214,6 +214,12 @@ def test_the_profile_fails_if_the_bench_does(card: Path, tmp_path: Path):
     assert run(card, tmp_path / "results", 6, PATH=path).returncode == 0
 
 
+def test_the_folder_holds_all_that_its_peers_import(card: Path):
+    asked = [sys.executable, card / "benches/gpu/gpu_peers.py", "--help"]
+    done = subprocess.run(asked, cwd=card.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.fixture
 def peers(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """benches/gpu/gpu_peers.py."""
