@@ -468,6 +468,16 @@ impl Client {
         matches!(granted, Ok(Response::Granted { .. }))
     }
 
+    /// Asks for a journal that is never joined. Returns whether it was granted.
+    #[cfg(test)]
+    pub(crate) fn ask_for_journal(&self) -> bool {
+        let request = Request::Journal { observed: 0 };
+        let granted = self
+            .connection
+            .ask(&request, &mut crate::hook::keep_waiting());
+        matches!(granted, Ok(Response::Journal { .. }))
+    }
+
     /// Errors when the daemon is gone. A few microseconds.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::config::Config;
+use iceoryx2::identifiers::UniqueClientId;
 use iceoryx2::port::client::Client as ControlClient;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -15,7 +16,7 @@ use iceoryx2::port::server::Server;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::event::EventOpenError;
-use iceoryx2::service::port_factory::{event, publish_subscribe};
+use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 
 use crate::attached::holders;
 use crate::descriptors;
@@ -58,6 +59,8 @@ pub(crate) type JournalService<S> = Port<publish_subscribe::PortFactory<S, [Line
 pub(crate) type FrameService<S> = Port<publish_subscribe::PortFactory<S, [Line], FrameHeader>>;
 /// Service that carries commands.
 pub(crate) type CommandService<S> = Port<publish_subscribe::PortFactory<S, [Line], CommandHeader>>;
+/// Service that carries requests and their answers.
+pub(crate) type ControlService<S> = Port<request_response::PortFactory<S, [u8], (), [u8], ()>>;
 /// Requests from a client.
 pub(crate) type Requester<S> = Port<ControlClient<S, [u8], (), [u8], ()>>;
 /// Requests at the daemon.
@@ -454,12 +457,11 @@ pub(crate) fn notifier<S: Service>(service: &EventService<S>) -> Result<Waker<S>
         .map_err(|error| ProtocolError::transport("create a notifier", error))
 }
 
-/// The daemon's end of the control service.
-pub(crate) fn responder<S: Service>(node: &Node<S>) -> Result<Responder<S>, ProtocolError> {
-    let failed =
-        |error: &dyn std::fmt::Debug| ProtocolError::transport("create service control", error);
-    let service = node
-        .service_builder(&service_name("control")?)
+/// Creates the control service.
+pub(crate) fn create_control<S: Service>(
+    node: &Node<S>,
+) -> Result<ControlService<S>, ProtocolError> {
+    node.service_builder(&service_name("control")?)
         .request_response::<[u8], [u8]>()
         .max_clients(CLIENTS_MAX)
         .max_servers(1)
@@ -470,15 +472,35 @@ pub(crate) fn responder<S: Service>(node: &Node<S>) -> Result<Responder<S>, Prot
         .max_borrowed_responses_per_pending_response(1)
         .enable_fire_and_forget_requests(true)
         .create()
-        .map_err(|error| failed(&error))?;
+        .map(|service| Port::new(node.config(), service))
+        .map_err(|error| ProtocolError::transport("create service control", error))
+}
+
+/// Whether a client of the control service is there, which one that was killed is until it is cleaned up.
+pub(crate) fn is_present<S: Service>(service: &ControlService<S>, client: UniqueClientId) -> bool {
+    let mut present = false;
+    service.dynamic_config().list_clients(|details| {
+        present |= details.client_id == client;
+        match present {
+            true => CallbackProgression::Stop,
+            false => CallbackProgression::Continue,
+        }
+    });
+    present
+}
+
+/// The daemon's end of the control service.
+pub(crate) fn responder<S: Service>(
+    service: &ControlService<S>,
+) -> Result<Responder<S>, ProtocolError> {
     service
         .server_builder()
         .initial_max_slice_len(crate::control::RESPONSE_MAX)
         .max_loaned_responses_per_request(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
-        .map(|port| Port::new(node.config(), port))
-        .map_err(|error| failed(&error))
+        .map(|port| Port::of(service.owner(), port))
+        .map_err(|error| ProtocolError::transport("create the control server", error))
 }
 
 /// A client's end of the control service.

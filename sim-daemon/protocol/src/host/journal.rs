@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use iceoryx2::identifiers::UniqueClientId;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
@@ -13,12 +14,12 @@ use crate::journal_header::{ENDED, JournalHeader};
 use crate::loaned;
 use crate::memory;
 use crate::storage;
-use crate::transport::{self, JournalPublisher, JournalService, journal_slots};
+use crate::transport::{self, ControlService, JournalPublisher, JournalService, journal_slots};
 use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
 /// Recorders that one daemon serves at once.
 pub(super) const RECORDERS_MAX: usize = 4;
-/// A recorder that was granted a journal and did not join within this time, in which it takes the memory, is gone.
+/// A recorder that lives and did not join its journal within this time, in which it takes the memory, is not coming.
 const JOIN_MAX: Duration = Duration::from_secs(10);
 /// Shared memory of one journal, if entries are small enough [bytes].
 const JOURNAL: usize = 32 << 20;
@@ -39,6 +40,8 @@ pub(super) struct Journals {
 /// One recorder's.
 #[derive(Debug)]
 struct Journal {
+    /// Who asked for it.
+    recorder: UniqueClientId,
     service: JournalService<S>,
     publisher: JournalPublisher<S>,
     /// Rows of the frame that it wants whole: a bit each.
@@ -95,6 +98,7 @@ impl Journals {
         node: &Node<S>,
         description: &Description,
         frame: &Table,
+        recorder: UniqueClientId,
         observed: u64,
     ) -> Result<(u64, u128), ProtocolError> {
         let (slot_bytes, depth) = Journals::size(description, frame, observed);
@@ -104,6 +108,7 @@ impl Journals {
         let publisher = storage::reserved_by_reader(make)?;
         let port = publisher.id().value();
         self.open.push(Journal {
+            recorder,
             service,
             publisher,
             observed,
@@ -118,13 +123,17 @@ impl Journals {
     }
 
     /// Meets new recorders and forgets those that went. Returns whether one waits for the state to begin with.
-    pub(super) fn refresh(&mut self, session: u64) -> bool {
+    pub(super) fn refresh(&mut self, session: u64, control: &ControlService<S>) -> bool {
         self.open.retain_mut(|journal| {
             let recorders = journal.service.dynamic_config().number_of_subscribers();
             journal.joined |= recorders > 0;
             // a recorder that cannot be reached is one that went: the next look tells
             let _ = journal.publisher.update_connections();
-            recorders > 0 || (!journal.joined && journal.since.elapsed() < JOIN_MAX)
+            let is_coming = || {
+                journal.since.elapsed() < JOIN_MAX
+                    && transport::is_present(control, journal.recorder)
+            };
+            recorders > 0 || (!journal.joined && is_coming())
         });
         self.send_end(session);
         let waits = |journal: &Journal| journal.joined && !journal.begun;

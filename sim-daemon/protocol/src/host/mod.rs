@@ -93,7 +93,8 @@ impl Host {
             (handshake::DOFS, description.dof_names.len().to_string()),
         ];
         let listener = transport::listener(&transport::create_event(&node, "wake", &attributes)?)?;
-        let responder = transport::responder(&node)?;
+        let control = transport::create_control(&node)?;
+        let responder = transport::responder(&control)?;
         described::write(daemon_lock.paths(), &description)?;
         let door = Door::open(daemon_lock.paths(), session)?;
         let observers = Observers::open(&node, &description, &frame)?;
@@ -118,6 +119,7 @@ impl Host {
             handover: Handover::default(),
             journals: Journals::default(),
             epochs: 1,
+            control,
             responder,
             observers,
             door,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use iceoryx2::identifiers::UniqueClientId;
 use iceoryx2::prelude::Node;
 
 use super::Inbox;
@@ -24,7 +25,7 @@ use crate::mapping;
 use crate::memory;
 use crate::paths::DaemonPaths;
 use crate::port::Port;
-use crate::transport::{self, Responder};
+use crate::transport::{self, ControlService, Responder};
 use crate::waiter::Awaited;
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, Op, ProtocolError, RefusalKind, Table};
 
@@ -43,6 +44,7 @@ pub(super) struct State {
     pub(super) handover: Handover,
     pub(super) journals: Journals,
     pub(super) epochs: u64,
+    pub(super) control: ControlService<S>,
     pub(super) responder: Responder<S>,
     pub(super) observers: Observers,
     pub(super) door: Door,
@@ -57,14 +59,15 @@ pub(super) struct State {
 }
 
 impl State {
-    /// Opens a journal, if there is room for it.
-    fn journal(&mut self, observed: u64) -> Response {
+    /// Opens a journal for a client of the control service, if there is room for it.
+    fn journal(&mut self, recorder: UniqueClientId, observed: u64) -> Response {
         let refused = |reason| Response::Refused { reason };
         if let Some(reason) = self.journals.ended() {
             return refused(format!("nothing can be recorded any more: {reason}"));
         }
         // those that ended since somebody looked
-        self.journals.refresh(self.description.session);
+        self.journals
+            .refresh(self.description.session, &self.control);
         if self.journals.are_full() {
             return refused(format!(
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
@@ -80,7 +83,11 @@ impl State {
             Ok(()) => {}
         }
         let (node, description) = (&self.node, &self.description);
-        match self.journals.open(node, description, &self.frame, observed) {
+        let frame = &self.frame;
+        match self
+            .journals
+            .open(node, description, frame, recorder, observed)
+        {
             Ok((journal, port)) => Response::Journal {
                 journal,
                 port: [(port >> 64) as u64, port as u64],
@@ -133,7 +140,7 @@ impl State {
                     Response::Lease { valid }
                 }
                 Ok(Request::DeviceMemory { epoch }) => self.visit(epoch),
-                Ok(Request::Journal { observed }) => self.journal(observed),
+                Ok(Request::Journal { observed }) => self.journal(active.origin(), observed),
                 Ok(Request::Timing { clear }) => {
                     let timing = self.pacer.timing();
                     if clear {
@@ -309,10 +316,11 @@ impl State {
         // new observers get the frame shown last, dead ones give their slots back
         guarded(|| self.observers.refresh());
         let session = self.description.session;
-        let waits = guarded(|| self.journals.refresh(session)).unwrap_or_else(|| {
-            self.journals.lose();
-            false
-        });
+        let waits =
+            guarded(|| self.journals.refresh(session, &self.control)).unwrap_or_else(|| {
+                self.journals.lose();
+                false
+            });
         let ended = self.handover.is_due().then_some(Next::LeaseEnded);
         let visits = self.visitor.is_some().then_some(Next::DeviceMemory);
         next.or(ended).or(visits).or(waits.then_some(Next::Record))

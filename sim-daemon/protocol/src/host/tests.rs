@@ -4,6 +4,7 @@ mod fake;
 
 use std::process::Stdio;
 
+use super::journal::RECORDERS_MAX;
 use super::*;
 use crate::PROTOCOL_VERSION;
 use crate::paths::DaemonPaths;
@@ -219,6 +220,17 @@ fn a_holder_that_died_before_it_came_holds_nothing() {
     dead.wait().unwrap();
     assert!(fake.attach().ask_for_lease(dead.id()));
     fake.attach().step(&[], &mut keep_waiting()).unwrap();
+}
+
+#[test]
+fn recorders_that_went_before_they_joined_take_no_place() {
+    let fake = Fake::start("unjoined");
+    for recorder in 0..3 * RECORDERS_MAX {
+        assert!(fake.attach().ask_for_journal(), "{recorder}");
+    }
+    let stays: Vec<_> = (0..RECORDERS_MAX).map(|_| fake.attach()).collect();
+    assert!(stays.iter().all(Client::ask_for_journal));
+    assert!(!fake.attach().ask_for_journal(), "those are on their way");
 }
 
 #[test]
