@@ -23,6 +23,8 @@ PATIENCE_SECONDS = 120.0
 # What viser 1.1.1 itself makes Chromium say when something is dragged; it does no harm.
 _OF_VISER = "Unable to preventDefault inside passive event listener invocation."
 _FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+# A canvas without a picture has one colour; a box far away, shaded and with smooth edges, has 80 and more.
+DRAWN_COLOURS = 20
 # The panel is at the right of a page, with its frame; the scene is seen in the rest.
 WIDTH, WIDE, HEIGHT, PANEL_WIDTH = 840, 1200, 520, 360
 
@@ -85,7 +87,7 @@ class View:
             self.page.wait_for_timeout(500)
             now = self.shot()
             moved, colours = differing(before, now), len(np.unique(now.reshape(-1, 3), axis=0))
-            if moved == 0 and colours > 100:
+            if moved == 0 and colours >= DRAWN_COLOURS:
                 return self.shot(name)
             resting = f"the page does not come to rest: {moved} pixels differ, there are {colours} colours"
             assert time.monotonic() < deadline, resting
