@@ -158,7 +158,7 @@ pub(crate) fn description(
                 actuators: [robot.actuators.start, robot.actuators.end],
                 is_mujoco: {
                     let mut models = info.scene.robots.iter();
-                    models.any(|own| own.name == robot.name && own.mujoco.is_some())
+                    models.any(|own| own.name == robot.name && own.precompiled.is_some())
                 },
             })
             .collect(),

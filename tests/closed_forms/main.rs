@@ -55,7 +55,7 @@ fn one_body(dt: f64, kind: JointKind, top: Top) -> Description {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     });
     scene
 }

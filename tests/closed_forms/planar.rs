@@ -48,7 +48,7 @@ fn pendulum(dt: f64, count: usize, l: f64) -> Description {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     });
     scene
 }

@@ -172,7 +172,7 @@ fn any_robot(dice: &mut Dice, name: &str) -> Robot {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     };
     for k in 0..links {
         let mut link = Link {

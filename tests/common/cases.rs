@@ -166,7 +166,7 @@ pub fn shapes(cone: Cone, contacts_max: Option<usize>) -> Case {
 pub fn shapes_as_mujoco() -> Case {
     let mut case = shapes(Cone::Elliptic, None);
     case.name = "as MuJoCo";
-    case.m.contacts.mujoco_capsule_boxes = true;
+    case.m.contacts.two_point_capsule_boxes = true;
     case
 }
 

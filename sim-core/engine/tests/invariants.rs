@@ -86,7 +86,7 @@ fn tree(seed: u64, joints: usize, floating: bool) -> Robot {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     };
     if floating {
         robot.float();

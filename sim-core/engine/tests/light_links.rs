@@ -61,7 +61,7 @@ fn arm(floating: bool) -> Arc<Model> {
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     };
     if floating {
         robot.float();

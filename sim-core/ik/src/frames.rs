@@ -28,7 +28,7 @@ pub fn frame(model: &Model, name: &str) -> Result<Mount<f64>, IkError> {
     if let Some(site) = at(model.site_names()) {
         return Ok(m.sites[site].mount.clone());
     }
-    if let Some(site) = at(model.mujoco_site_names()) {
+    if let Some(site) = at(model.output_site_names()) {
         return Ok(m.outputs.sites[site].clone());
     }
     let names = frame_names(model);
@@ -42,5 +42,5 @@ pub fn frame(model: &Model, name: &str) -> Result<Mount<f64>, IkError> {
 /// Names of all frames: links, sites, and sites of MuJoCo models.
 pub fn frame_names(model: &Model) -> Vec<String> {
     let own = model.body_names().iter().chain(model.site_names());
-    own.chain(model.mujoco_site_names()).cloned().collect()
+    own.chain(model.output_site_names()).cloned().collect()
 }

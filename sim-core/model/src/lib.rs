@@ -47,8 +47,8 @@ mod value_checks;
 mod visual;
 
 pub use description::{
-    Actuator, Collision, ContactSensor, Description, HeightScan, Joint, JointDof, Link, Mimic,
-    MujocoJoint, MujocoParts, ParamDraw, Robot, Site, Solver, StaticShape, TargetMode,
+    Actuator, Collision, ContactSensor, Description, HeightScan, Joint, JointDof, JointExtras,
+    Link, Mimic, ParamDraw, Precompiled, Robot, Site, Solver, StaticShape, TargetMode,
 };
 pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;

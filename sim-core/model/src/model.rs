@@ -40,7 +40,7 @@ pub struct Model {
     pub(crate) sensors: Vec<SensorInfo>,
     pub(crate) refused_sensors: Vec<String>,
     pub(crate) site_names: Vec<String>,
-    pub(crate) mujoco_site_names: Vec<String>,
+    pub(crate) output_site_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
     pub(crate) robots: Vec<RobotRange>,
@@ -173,8 +173,8 @@ impl Model {
         &self.site_names
     }
     /// Names of the sites of MuJoCo models, `robot/site`.
-    pub fn mujoco_site_names(&self) -> &[String] {
-        &self.mujoco_site_names
+    pub fn output_site_names(&self) -> &[String] {
+        &self.output_site_names
     }
     /// What each contact sensor adds up.
     pub fn contact_sensors(&self) -> &[SensedShapes] {
@@ -224,9 +224,9 @@ impl Model {
             activations: self.constants.actuators.activations,
             mocaps: self.constants.mocaps,
             equalities: self.constants.switches,
-            mujoco_bodies: self.constants.outputs.bodies.len(),
-            mujoco_sites: self.constants.outputs.sites.len(),
-            mujoco_geoms: self.constants.outputs.geoms.len(),
+            output_bodies: self.constants.outputs.bodies.len(),
+            output_sites: self.constants.outputs.sites.len(),
+            output_geoms: self.constants.outputs.geoms.len(),
             sensordata: self.constants.sensors.scalars,
         }
     }

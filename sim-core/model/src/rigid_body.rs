@@ -122,7 +122,7 @@ impl Description {
             notes,
             warnings: Vec::new(),
             urdf: None,
-            mujoco: None,
+            precompiled: None,
         };
         if !body.fixed {
             robot.free_root("free");

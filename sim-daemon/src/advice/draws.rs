@@ -16,7 +16,10 @@ const DEVIATIONS: f64 = 2.0;
 /// Advice on what a reset draws.
 pub(super) fn advice(scene: &Description) -> Vec<String> {
     // what MuJoCo compiled has its own conventions
-    let robots = scene.robots.iter().filter(|robot| robot.mujoco.is_none());
+    let robots = scene
+        .robots
+        .iter()
+        .filter(|robot| robot.precompiled.is_none());
     let mut all: Vec<String> = robots.filter_map(starts).collect();
     all.extend(noise(scene));
     all.extend(masses(scene));

@@ -95,7 +95,7 @@ pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
                     && dof.friction <= HELD * dof.target_ke
                     && dof.effort_limit != Some(0.0)
             };
-            if robot.mujoco.is_none() && joint.dofs.iter().zip(&weights[own]).any(swings) {
+            if robot.precompiled.is_none() && joint.dofs.iter().zip(&weights[own]).any(swings) {
                 names.push(format!("`{}`", joint.name));
             }
         }
@@ -132,7 +132,7 @@ pub(super) fn unstable(scene: &Description, model: &Model) -> Vec<String> {
             first = own.end;
             let is_simple = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
             // what MuJoCo compiled has actuators of its own, and a follower moves its leader's inertia
-            if !is_simple || robot.mujoco.is_some() || is_coupled(robot, joint) {
+            if !is_simple || robot.precompiled.is_some() || is_coupled(robot, joint) {
                 continue;
             }
             for (dof, weight) in joint.dofs.iter().zip(&weights[own]) {

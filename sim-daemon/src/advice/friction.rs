@@ -13,7 +13,7 @@ const DEVIATIONS: f64 = 4.0;
 /// Advice on draws of `shape_mu` without an effect.
 pub(super) fn advice(scene: &Description, model: &Model) -> Vec<String> {
     // contacts with geoms of MuJoCo models keep the larger one, whatever the rule
-    let has_geoms = scene.robots.iter().any(|robot| robot.mujoco.is_some());
+    let has_geoms = scene.robots.iter().any(|robot| robot.precompiled.is_some());
     let draws = model.start().params.iter();
     let drawn: BTreeMap<usize, [f64; 2]> = draws
         .filter(|draw| draw.param == Param::ShapeMu)

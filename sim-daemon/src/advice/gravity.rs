@@ -49,6 +49,9 @@ fn drawn(scene: &Description) -> Option<String> {
 
 /// Whether something of the scene moves that MuJoCo did not compile.
 fn has_moving(scene: &Description) -> bool {
-    let mut robots = scene.robots.iter().filter(|robot| robot.mujoco.is_none());
+    let mut robots = scene
+        .robots
+        .iter()
+        .filter(|robot| robot.precompiled.is_none());
     robots.any(|robot| !robot.moving_joints().is_empty())
 }

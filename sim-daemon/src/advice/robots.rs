@@ -18,7 +18,11 @@ const MESH_MIN: f64 = 5e-4;
 pub(super) fn advice(scene: &Description) -> Vec<String> {
     let mut all = Vec::new();
     let is_weightless = scene.gravity == [0.0; 3] || varies(scene, Param::Gravity);
-    for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
+    for robot in scene
+        .robots
+        .iter()
+        .filter(|robot| robot.precompiled.is_none())
+    {
         if robot.urdf.is_none() {
             continue;
         }

@@ -50,7 +50,10 @@ fn deep_pairs(scene: &Description, model: &Arc<Model>) -> Option<Vec<String>> {
     let names = model.shape_names();
     let is_geom = |shape: i32| {
         let owner = names[shape as usize].split('/').next();
-        let mut models = scene.robots.iter().filter(|robot| robot.mujoco.is_some());
+        let mut models = scene
+            .robots
+            .iter()
+            .filter(|robot| robot.precompiled.is_some());
         models.any(|robot| Some(robot.name.as_str()) == owner)
     };
     let found = distances.iter().zip(pairs.as_chunks().0).take(count);

@@ -28,7 +28,11 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
     let sites = scene.sites.iter();
     all.extend(sites.filter_map(|site| turned(&format!("site `{}`", site.name), &site.pose)));
     // what MuJoCo compiled has its own conventions, and its own warnings
-    for robot in scene.robots.iter().filter(|robot| robot.mujoco.is_none()) {
+    for robot in scene
+        .robots
+        .iter()
+        .filter(|robot| robot.precompiled.is_none())
+    {
         let name = full_name(robot);
         let base = robot.joints.iter().find(|joint| joint.parent.is_none());
         let start = base.filter(|joint| joint.kind == JointKind::Free);

@@ -81,7 +81,7 @@ fn robot(own: &Robot, names: &mut impl Iterator<Item = String>, first: &mut [usi
         "name": own.name,
         "pos": own.pose.pos,
         "quat": own.pose.quat,
-        "from_mujoco": own.mujoco.is_some(),
+        "from_mujoco": own.precompiled.is_some(),
         "links": links,
     })
 }

@@ -60,18 +60,18 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
     scene.validate()?;
     let robot = &scene.robots[0];
     let mut summary = robot_summary(robot);
-    let actuators = robot.mujoco.iter().flat_map(|parts| &parts.actuators);
+    let actuators = robot.precompiled.iter().flat_map(|parts| &parts.actuators);
     let solver = &scene.solver;
     summary["actuator_names"] = actuators
         .map(|actuator| Value::from(actuator.name.as_str()))
         .collect();
-    if let Some(parts) = &robot.mujoco {
+    if let Some(parts) = &robot.precompiled {
         let sensors = parts.sensors.all.iter().map(|sensor| &sensor.name);
         summary["site_names"] = json!(parts.frames.site_names);
         summary["geom_names"] = json!(parts.frames.geom_names);
         summary["sensor_names"] = sensors.map(|name| json!(name)).collect();
     }
-    let integrator = robot.mujoco.as_ref().map(|parts| {
+    let integrator = robot.precompiled.as_ref().map(|parts| {
         let implicit = if parts.implicit_damping {
             ""
         } else {

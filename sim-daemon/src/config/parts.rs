@@ -67,7 +67,7 @@ impl SceneFile {
 
     /// How many of a link's shapes are its robot's file's; those of the scene come after them.
     fn own_shapes(&self, robot: &Robot, link: &Link) -> usize {
-        if robot.urdf.is_none() && robot.mujoco.is_none() {
+        if robot.urdf.is_none() && robot.precompiled.is_none() {
             return 0;
         }
         let it = Some((robot.name.as_str(), link.name.as_str()));
@@ -135,7 +135,7 @@ impl Place {
 
     /// A link of a robot. The world of a MuJoCo model, its first link, is the world.
     fn of(robot: &Robot, link: &str) -> Place {
-        let is_world = robot.mujoco.is_some() && robot.links[0].name == link;
+        let is_world = robot.precompiled.is_some() && robot.links[0].name == link;
         Place {
             robot: Some(robot.name.clone()),
             body: (!is_world).then(|| format!("{}/{link}", robot.name)),

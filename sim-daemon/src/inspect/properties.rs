@@ -136,7 +136,7 @@ impl<'a> Properties<'a> {
     /// Whether everything that moves is free, of a URDF file its root.
     pub fn is_floating(&self) -> bool {
         let all_free = || self.roots().count() > 0 && self.roots().all(|is_free| is_free);
-        self.robot.floating || (self.robot.mujoco.is_some() && all_free())
+        self.robot.floating || (self.robot.precompiled.is_some() && all_free())
     }
 
     /// What holds the robot.

@@ -79,7 +79,7 @@ fn collisions(properties: &Properties, poses: &[Pose], args: &Inspect) -> [Vec<D
     let robot = properties.robot;
     let [mut own, mut around] = [Vec::new(), Vec::new()];
     for (place, (&link, pose)) in properties.order.iter().zip(poses).enumerate() {
-        let is_world = robot.mujoco.is_some() && properties.joint(link).is_none();
+        let is_world = robot.precompiled.is_some() && properties.joint(link).is_none();
         // a plane has no end; the picture has a floor of its own
         let shapes = &robot.links[link].collisions;
         for collision in shapes.iter().filter(|own| own.shape != Shape::Plane) {
@@ -100,7 +100,7 @@ fn collisions(properties: &Properties, poses: &[Pose], args: &Inspect) -> [Vec<D
 fn configuration(properties: &Properties, args: &Inspect) -> String {
     let mut caption = match &args.joint_q {
         Some(joint_q) => format!("joint_q = {}", commas(joint_q)),
-        None if properties.robot.mujoco.is_some() => "at the start".to_owned(),
+        None if properties.robot.precompiled.is_some() => "at the start".to_owned(),
         None if properties.robot.joints.iter().any(starts_elsewhere) => {
             "joint_q = 0, mimic joints with their leaders".to_owned()
         }
@@ -145,7 +145,7 @@ fn looks(
         let place = place.filter(|&place| is_meant(place));
         // the world of a MuJoCo model is around the robot
         let place = place.filter(|&place| {
-            robot.mujoco.is_none() || properties.joint(properties.order[place]).is_some()
+            robot.precompiled.is_none() || properties.joint(properties.order[place]).is_some()
         });
         let Some(place) = place else {
             continue;

@@ -13,7 +13,7 @@ use device::Gpu;
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::Cone;
 use sim_physics::constants::contact::{Kind, PAIR_KINDS};
-use sim_physics::step::{Runs, StageId};
+use sim_physics::step::StageId;
 use worlds::{Left, Worlds};
 
 /// How far from double precision a stage may be, in each part of what it leaves.
@@ -69,8 +69,7 @@ fn pair(stage: StageId) -> Option<(Kind, Kind)> {
 /// The stages that a model needs: those of a step, those that show its state, and at last the one that moves it on.
 fn order(m: &Constants<f32>) -> Vec<StageId> {
     let needed = StageId::all().filter(|stage| stage.is_needed(m));
-    let (moves, others): (Vec<_>, Vec<_>) =
-        needed.partition(|stage| stage.row().runs == Runs::Step);
+    let (moves, others): (Vec<_>, Vec<_>) = needed.partition(|stage| stage.row().runs.moves());
     others.into_iter().chain(moves).collect()
 }
 

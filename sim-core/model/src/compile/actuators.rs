@@ -1,7 +1,7 @@
 //! Actuators of MuJoCo models, by the dofs of the scene.
 
 use super::carrier::Carrier;
-use super::clusters::path;
+use super::contacts::clusters::path;
 use super::sites::mounted;
 use super::ties::terms;
 use crate::description::{self, ActuatorActivation, ActuatorLength};

@@ -3,9 +3,9 @@
 use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofJoint, SoftJoint};
-use super::mujoco_frames::add_frames;
+use super::output_frames::add_frames;
 use super::ties::{DofConstraint, terms};
-use crate::description::{Joint, MujocoJoint, MujocoParts, Robot, TargetMode};
+use crate::description::{Description, Joint, JointExtras, Precompiled, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, SensorInfo, Start};
@@ -55,6 +55,16 @@ pub(super) struct BodyBuilder {
 }
 
 impl BodyBuilder {
+    /// All robots of a scene.
+    pub fn of(scene: &Description) -> BodyBuilder {
+        let mut builder = BodyBuilder {
+            dt: scene.dt,
+            ..BodyBuilder::default()
+        };
+        scene.robots.iter().for_each(|robot| builder.add(robot));
+        builder
+    }
+
     pub fn add(&mut self, robot: &Robot) {
         let (first_dof, first_coord) = (self.dofs.len(), self.coord_names.len());
         let (first_frame, first_body) = (self.frames.len(), self.bodies.len());
@@ -93,14 +103,14 @@ impl BodyBuilder {
                     false => carriers[link],
                 };
                 first = false;
-                if robot.mujoco.is_some() && at.body.is_none() && joint.moves() {
+                if robot.precompiled.is_some() && at.body.is_none() && joint.moves() {
                     at = self.rooted(at);
                 }
                 dof_of[index] = self.dofs.len();
-                let own = robot.mujoco.as_ref().map(|parts| &parts.joints[index]);
+                let own = robot.precompiled.as_ref().map(|parts| &parts.joints[index]);
                 carriers[link] = self.add_joint(joint, own, at);
             }
-            let mocaps = robot.mujoco.as_ref().map(|parts| &parts.mocaps);
+            let mocaps = robot.precompiled.as_ref().map(|parts| &parts.mocaps);
             if mocaps.is_some_and(|mocaps| mocaps.contains(&link)) {
                 carriers[link] = self.add_mocap(carriers[link]);
             }
@@ -124,7 +134,7 @@ impl BodyBuilder {
         for joint in robot.moving_joints() {
             self.add_followers(robot, joint, &dof_of);
         }
-        if let Some(parts) = &robot.mujoco {
+        if let Some(parts) = &robot.precompiled {
             self.add_mujoco(robot, parts, &dof_of, &carriers);
         }
         self.carriers.push(carriers);
@@ -155,7 +165,7 @@ impl BodyBuilder {
     }
 
     /// The bodies of a joint whose frame is `at`; returns where they carry its link. `own` is what only MuJoCo's joints have.
-    fn add_joint(&mut self, joint: &Joint, own: Option<&MujocoJoint>, at: Carrier) -> Carrier {
+    fn add_joint(&mut self, joint: &Joint, own: Option<&JointExtras>, at: Carrier) -> Carrier {
         let turn = z_to(joint.axis);
         let mut back = turn.inverse();
         let mut at = at;
@@ -267,7 +277,7 @@ impl BodyBuilder {
                 limit_gains: dof.limit_gains(),
                 friction: dof.friction,
                 mimic: None,
-                mujoco: None,
+                soft: None,
             });
         }
         Carrier {
@@ -289,7 +299,7 @@ impl BodyBuilder {
     fn add_mujoco(
         &mut self,
         robot: &Robot,
-        parts: &MujocoParts,
+        parts: &Precompiled,
         dof_of: &[usize],
         carriers: &[Carrier],
     ) {
@@ -302,7 +312,7 @@ impl BodyBuilder {
             let (joint, own) = (&robot.joints[index], &parts.joints[index]);
             let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();
             for dof in dofs.clone() {
-                self.joints[dof].mujoco = Some(SoftJoint {
+                self.joints[dof].soft = Some(SoftJoint {
                     limit: own.limit,
                     margin: own.margin,
                     friction: own.friction,

@@ -22,7 +22,7 @@ pub(super) struct DofJoint {
     pub limit_gains: [f64; 2],
     pub friction: f64,
     pub mimic: Option<(usize, f64, f64)>,
-    pub mujoco: Option<SoftJoint>,
+    pub soft: Option<SoftJoint>,
 }
 
 /// Softness of the rows of a joint from MuJoCo.
@@ -56,7 +56,7 @@ pub(super) fn add_rows(
         }
         let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
         if (joint.friction > 0.0 || friction_varies) && !moves_freely {
-            let soft = match joint.mujoco {
+            let soft = match joint.soft {
                 Some(own) => own_soft(&own.friction, weight, dt, own.safe_references),
                 None => soft(SOLREF, weight, dt),
             };
@@ -72,7 +72,7 @@ pub(super) fn add_rows(
                 zone: regularizer * joint.friction,
             });
         }
-        if let (Some([lower, upper]), Some(own)) = (joint.range, joint.mujoco) {
+        if let (Some([lower, upper]), Some(own)) = (joint.range, joint.soft) {
             let soft = own_soft(&own.limit, weight, dt, own.safe_references);
             let (lower, upper) = (lower + own.margin, upper - own.margin);
             // where both sides may act at once, each has a row of its own

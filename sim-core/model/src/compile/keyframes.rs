@@ -24,7 +24,9 @@ pub(super) fn states(
     };
     let (mut all, mut first_act, mut first_mocap) = (Vec::new(), 0, 0);
     for (robot, range) in robots.iter().zip(ranges) {
-        let Some(parts) = &robot.mujoco else { continue };
+        let Some(parts) = &robot.precompiled else {
+            continue;
+        };
         for key in &parts.keyframes {
             let mut state = base.clone();
             state.name = format!("{}/{}", robot.name, key.name);

@@ -57,7 +57,7 @@ pub(super) fn add_parts(
 
 /// What a link without mass has, about the centre of mass that its file gives.
 pub(super) fn massless(robot: &Robot, link: usize) -> Inertial {
-    let parts = robot.mujoco.as_ref();
+    let parts = robot.precompiled.as_ref();
     Inertial {
         pos: parts.map_or([0.0; 3], |parts| parts.frames.inertias[link].pose.pos),
         ..Inertial::default()

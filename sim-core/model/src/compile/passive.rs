@@ -3,17 +3,19 @@
 use super::bodies::{BodyBuilder, columns};
 use super::carrier::Carrier;
 use super::masses::massless;
-use crate::description::{Compensator, Description, Joint, MujocoJoint, MujocoParts, Robot};
+use crate::description::{Compensator, Description, Joint, JointExtras, Precompiled, Robot};
 use crate::joint_kind::JointKind;
-use sim_physics::constants::Constants;
+use sim_physics::constants::actuators::Actuator;
+use sim_physics::constants::options::Integrator;
 use sim_physics::constants::params::Param;
 use sim_physics::constants::passive::{Compensation, Drag};
 use sim_physics::constants::springs::{PoseSpring, Spring};
+use sim_physics::constants::{Constants, Motion};
 use std::ops::Range;
 
 impl BodyBuilder {
     /// What acts on a joint by itself. `dofs` are its own.
-    pub(super) fn add_passive(&mut self, joint: &Joint, own: &MujocoJoint, dofs: Range<usize>) {
+    pub(super) fn add_passive(&mut self, joint: &Joint, own: &JointExtras, dofs: Range<usize>) {
         let body = self.dofs[dofs.start].body;
         let has_pose = matches!(joint.kind, JointKind::Ball | JointKind::Free);
         if own.stiffness != 0.0 && has_pose {
@@ -41,7 +43,7 @@ impl BodyBuilder {
     }
 
     /// What the medium does to links.
-    pub(super) fn add_drags(&mut self, parts: &MujocoParts, carriers: &[Carrier]) {
+    pub(super) fn add_drags(&mut self, parts: &Precompiled, carriers: &[Carrier]) {
         for drag in &parts.drags {
             let carrier = &carriers[drag.link];
             let inertial = carrier.pose.mul(&drag.inertial);
@@ -66,7 +68,7 @@ impl BodyBuilder {
     pub(super) fn add_compensations(
         &mut self,
         robot: &Robot,
-        parts: &MujocoParts,
+        parts: &Precompiled,
         carriers: &[Carrier],
     ) {
         let first = self.frames.len() - robot.links.len();
@@ -102,8 +104,37 @@ pub(super) fn keep_acting(m: &mut Constants<f64>, scene: &Description) {
                 .iter()
                 .any(|dof| dof.armature != 0.0 || dof.damping != 0.0)
     });
+    let of_free_joint = |dof: &usize| m.free_joints.contains(&dofs[*dof].body);
+    m.diagonal_dofs = (0..dofs.len()).filter(|dof| !of_free_joint(dof)).collect();
     if m.compensation.links.is_empty() {
         m.compensation.passive_dofs.clear();
         m.compensation.actuated_dofs.clear();
     }
+}
+
+/// Finds what an implicit step treats apart: actuators with damping, and free bodies that carry nothing.
+pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
+    let varies = [Param::ActuatorGain, Param::ActuatorBias];
+    let varies = varies.iter().any(|param| scene.params.contains(param));
+    let actuators = &m.actuators.all;
+    let damped = (0..actuators.len()).filter(|&k| {
+        let Actuator { gain, bias, .. } = &actuators[k];
+        varies || gain[2] != 0.0 || bias[2] != 0.0
+    });
+    m.actuators.damped = damped.collect();
+    if m.integrator != Integrator::ImplicitFast {
+        return;
+    }
+    let damped = m.actuators.damped.iter().map(|&k| &m.actuators.all[k]);
+    let turning = damped.flat_map(|actuator| &actuator.turning);
+    let driven: Vec<usize> = turning.flat_map(|length| length.dofs.clone()).collect();
+    let is_solved = |body: &usize| {
+        m.free_joints.contains(body)
+            || m.drags.iter().any(|drag| drag.body == *body)
+            || driven.iter().any(|&dof| m.dofs[dof].body == *body)
+    };
+    let is_alone = |body: &usize| m.bodies.iter().all(|other| other.parent != Some(*body));
+    let free = (0..m.bodies.len()).filter(|&body| m.bodies[body].motion == Motion::Free);
+    let (solved, others) = free.filter(is_alone).partition(is_solved);
+    (m.solved_bodies, m.gyroscopic_bodies) = (solved, others);
 }

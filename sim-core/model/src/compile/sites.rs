@@ -1,7 +1,7 @@
 //! Sites as the kernel source reads them, and the shapes that contact sensors are of.
 
 use super::carrier::Carrier;
-use super::clusters::path;
+use super::contacts::clusters::path;
 use crate::description::{Bearer, ContactSensor, Description, named};
 use crate::error::ModelError;
 use crate::model::SensedShapes;

@@ -1,8 +1,8 @@
 //! Constraints of MuJoCo models whose Jacobians are found at run time.
 
 use super::carrier::Carrier;
-use super::clusters::path;
 use super::constraint_rows::{FAR, own_soft};
+use super::contacts::clusters::path;
 use super::sites::mounted;
 use crate::description::{Constraint, ConstraintLaw, Measure};
 use sim_physics::constants::springs::Term;

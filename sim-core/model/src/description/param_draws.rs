@@ -136,7 +136,7 @@ impl Description {
             }
             Per::Actuator(n) => {
                 let models = self.robots.iter();
-                let models = models.filter_map(|robot| Some((robot, robot.mujoco.as_ref()?)));
+                let models = models.filter_map(|robot| Some((robot, robot.precompiled.as_ref()?)));
                 let names = models.flat_map(|(robot, parts)| {
                     let name =
                         |own: &str| vec![robot.name.clone(), format!("{}/{own}", robot.name)];

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::joint::Joint;
-use super::mujoco::MujocoParts;
+use super::precompiled::Precompiled;
 use crate::geom_contact::GeomContact;
 use crate::geometry::Shape;
 use crate::inertia::Inertial;
@@ -32,7 +32,7 @@ pub struct Robot {
     /// The URDF file it was read from.
     pub urdf: Option<PathBuf>,
     /// What it has beyond links and joints, where MuJoCo compiled it.
-    pub mujoco: Option<Box<MujocoParts>>,
+    pub precompiled: Option<Box<Precompiled>>,
 }
 
 /// A rigid body of a robot.

@@ -81,6 +81,9 @@ impl Additions<'_> {
                     tendons,
                 },
             free_joints,
+            diagonal_dofs: _,
+            solved_bodies: _,
+            gyroscopic_bodies: _,
             drags,
             compensation:
                 GravityCompensation {
@@ -95,6 +98,7 @@ impl Additions<'_> {
                 Actuators {
                     all,
                     activations,
+                    damped: _,
                     dof_bounds,
                     tendon_bounds,
                 },

@@ -31,7 +31,7 @@ view! {
         Always { "memory": memory }
         Later { "turning": turning }
         Later { "combine": combine, "keeps_max": keeps_max }
-        Later { "mujoco_capsule_boxes": mujoco_capsule_boxes }
+        Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         => impedances, bodies;
     Handles as "Handles":
         Always {

@@ -43,7 +43,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
             }),
         });
     }
-    if let Some(parts) = &mut robot.mujoco {
+    if let Some(parts) = &mut robot.precompiled {
         parts.actuators = actuators;
         if !acts {
             for joint in &mut parts.joints {

@@ -7,7 +7,7 @@ use super::options::has_flag;
 use super::tendons::{Tendons, moving};
 use super::tree::softness;
 use crate::description::{
-    Constraint, ConstraintLaw, JointKind, Measure, MujocoParts, Robot, Tendon,
+    Constraint, ConstraintLaw, JointKind, Measure, Precompiled, Robot, Tendon,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -17,7 +17,7 @@ use crate::softness::Softness;
 pub(super) fn add_constraints(
     file: &ModelFile,
     robot: &Robot,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let tendons = Tendons::read(file, robot)?;
     let none = has_flag(file, "mjDSBL_CONSTRAINT")?;
@@ -54,7 +54,7 @@ fn add_equalities(
     file: &ModelFile,
     robot: &Robot,
     tendons: &Tendons,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let count = file.rows("eq_type");
     if count == 0 {
@@ -97,7 +97,7 @@ struct Equalities<'a> {
 
 impl Equalities<'_> {
     /// q₁ - r₁ = p(q₂ - r₂), with the references r.
-    fn add_joint(&self, k: usize, parts: &mut MujocoParts) -> Result<(), ModelError> {
+    fn add_joint(&self, k: usize, parts: &mut Precompiled) -> Result<(), ModelError> {
         let joint = |joint: i64| {
             let place = usize::try_from(joint).ok();
             let place = place.and_then(|joint| self.joints.get(joint)).copied();
@@ -107,8 +107,8 @@ impl Equalities<'_> {
                 self.file.fault(fault)
             })
         };
-        let reference = |parts: &MujocoParts, joint: usize| parts.joints[joint].reference;
-        let weight = |parts: &MujocoParts, joint: usize| {
+        let reference = |parts: &Precompiled, joint: usize| parts.joints[joint].reference;
+        let weight = |parts: &Precompiled, joint: usize| {
             let before = &self.robot.joints[..joint];
             let dof: usize = before.iter().map(|joint| joint.dofs.len()).sum();
             parts.dof_inverse_weight[dof]
@@ -141,7 +141,7 @@ impl Equalities<'_> {
     }
 
     /// The same of the lengths of tendons.
-    fn add_tendon(&self, k: usize, parts: &mut MujocoParts) -> Result<(), ModelError> {
+    fn add_tendon(&self, k: usize, parts: &mut Precompiled) -> Result<(), ModelError> {
         let count = self.tendons.names.len();
         let lengths = self.file.reals("tendon_length0", count)?;
         let weights = self.file.reals("tendon_invweight0", count)?;
@@ -176,7 +176,7 @@ impl Equalities<'_> {
         &self,
         k: usize,
         is_weld: bool,
-        parts: &mut MujocoParts,
+        parts: &mut Precompiled,
     ) -> Result<(), ModelError> {
         let file = self.file;
         let [x, y, z, a, b, c, qw, qx, qy, qz, torque_scale] = self.data[k];
@@ -222,7 +222,7 @@ fn add_frictions(
     file: &ModelFile,
     robot: &Robot,
     tendons: &Tendons,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let mut dof = 0;
     for (place, joint) in robot.joints.iter().enumerate() {
@@ -258,7 +258,7 @@ fn add_limits(
     file: &ModelFile,
     robot: &Robot,
     tendons: &Tendons,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let joints = file.rows("jnt_type");
     let limited = file.integers("jnt_limited", joints)?;
@@ -305,7 +305,7 @@ fn add_limits(
 fn add_springs(
     file: &ModelFile,
     tendons: &Tendons,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let count = tendons.names.len();
     let kept = |name: &str, flag: &str| -> Result<Vec<f64>, ModelError> {

@@ -65,7 +65,7 @@ pub(super) fn add_geoms(
         );
         let link = bodies[geom].ok_or_else(|| file.fault("has geoms without bodies".to_owned()))?;
         all[geom] = Some((link, robot.links[link].collisions.len()));
-        if let Some(parts) = &mut robot.mujoco {
+        if let Some(parts) = &mut robot.precompiled {
             parts.frames.collisions[geom] = Some(robot.links[link].collisions.len());
         }
         robot.links[link].collisions.push(Collision {

@@ -1,4 +1,4 @@
-//! Models that MuJoCo compiled, from a file that `tightloop.mujoco` exports.
+//! Models that MuJoCo compiled, from a file that `tightloop.precompiled` exports.
 //!
 //! The file holds arrays of `mjModel` under their own names (`format.rs` reads them). MuJoCo's defaults,
 //! includes and unit conversions are done then. What the physics does not have is refused by the element's name
@@ -132,7 +132,7 @@ fn sensor_notes(file: &ModelFile, robot: &Robot) -> Result<Vec<String>, ModelErr
             "its {sensors} sensors are not read; save the scene again"
         )]);
     }
-    let parts = robot.mujoco.as_ref().map(|parts| &parts.sensors);
+    let parts = robot.precompiled.as_ref().map(|parts| &parts.sensors);
     let refused = parts.map_or(&[][..], |sensors| &sensors.refused);
     Ok(match refused.is_empty() {
         true => Vec::new(),

@@ -40,7 +40,7 @@ pub(super) fn add_pairs(
     robot: &mut Robot,
 ) -> Result<(), ModelError> {
     let pairs = geoms(file, file.rows("geom_type"))?;
-    let Some(parts) = robot.mujoco.as_mut().filter(|_| !places.is_empty()) else {
+    let Some(parts) = robot.precompiled.as_mut().filter(|_| !places.is_empty()) else {
         return Ok(());
     };
     if pairs.is_empty() {

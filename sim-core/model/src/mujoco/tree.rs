@@ -8,7 +8,7 @@ use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
 use super::{passive, tendons};
 use crate::description::{
-    Compensator, Inertial, Joint, JointDof, JointKind, Link, MujocoJoint, MujocoParts, Robot,
+    Compensator, Inertial, Joint, JointDof, JointExtras, JointKind, Link, Precompiled, Robot,
     SensorParts,
 };
 use crate::error::ModelError;
@@ -35,7 +35,7 @@ pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, 
         notes: Vec::new(),
         warnings: Vec::new(),
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     };
     let mut parts = parts(file, bodies, &parents)?;
     add_joints(file, options, &parents, &mut robot, &mut parts)?;
@@ -48,7 +48,7 @@ pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, 
         return Err(file.fault("has coordinates without joints".to_owned()));
     }
     constraints::add_constraints(file, &robot, &mut parts)?;
-    robot.mujoco = Some(Box::new(parts));
+    robot.precompiled = Some(Box::new(parts));
     Ok(robot)
 }
 
@@ -79,7 +79,7 @@ fn parts(
     file: &ModelFile,
     bodies: usize,
     parents: &[Option<usize>],
-) -> Result<MujocoParts, ModelError> {
+) -> Result<Precompiled, ModelError> {
     let welds = file.indices("body_weldid", bodies, bodies)?;
     let weights = file.vectors::<2>("body_invweight0", bodies)?;
     let signatures = file.integers("exclude_signature", file.rows("exclude_signature"))?;
@@ -98,7 +98,7 @@ fn parts(
     if !mocaps.clone().is_sorted() {
         return Err(file.fault("has mocap bodies in another order than its bodies".to_owned()));
     }
-    Ok(MujocoParts {
+    Ok(Precompiled {
         keyframes: super::keyframes::keyframes(file)?,
         mocaps: mocaps.collect(),
         link_inverse_weight: weights.into_iter().map(|[linear, _]| linear).collect(),
@@ -229,7 +229,7 @@ fn add_joints(
     options: &MujocoOptions,
     parents: &[Option<usize>],
     robot: &mut Robot,
-    parts: &mut MujocoParts,
+    parts: &mut Precompiled,
 ) -> Result<(), ModelError> {
     let bodies = robot.links.len();
     let places = file.vectors::<3>("body_pos", bodies)?;
@@ -250,7 +250,7 @@ fn add_joints(
             let mut joint = Joint::fixed(&name, parents[body].unwrap_or(0), body);
             joint.origin = origin;
             robot.joints.push(joint);
-            parts.joints.push(MujocoJoint::default());
+            parts.joints.push(JointExtras::default());
         }
         for (place, joint) in own.into_iter().enumerate() {
             let (mut joint, mut own) = all.joint(file, joint, body, parents[body].unwrap_or(0))?;
@@ -282,7 +282,7 @@ impl JointArrays {
         k: usize,
         body: usize,
         parent: usize,
-    ) -> Result<(Joint, MujocoJoint), ModelError> {
+    ) -> Result<(Joint, JointExtras), ModelError> {
         let kind = self.kinds[k];
         let mut joint = Joint::new(kind, &self.names[k], Some(parent), body);
         let (coords, dofs) = (kind.coord_names().len(), kind.dof_names().len());
@@ -311,7 +311,7 @@ impl JointArrays {
             })
             .collect();
         let is_scalar = dofs == 1;
-        let own = MujocoJoint {
+        let own = JointExtras {
             anchor: if kind == JointKind::Free {
                 [0.0; 3]
             } else {

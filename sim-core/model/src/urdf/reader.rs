@@ -69,7 +69,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             notes,
             warnings: [self.scan.warnings(), self.missing_visuals()].concat(),
             urdf: Some(self.path.to_owned()),
-            mujoco: None,
+            precompiled: None,
         };
         robot.place_free_bodies();
         if self.options.floating {

@@ -102,7 +102,7 @@ impl Robot {
             collision.surface.validate(&what)?;
             // geoms of the world are shapes of link 0
             let is_static = matches!(collision.shape, Shape::Plane | Shape::HeightField(_));
-            if is_static && self.mujoco.is_none() {
+            if is_static && self.precompiled.is_none() {
                 return Err(ModelError::PlaneBorne { what });
             }
         }

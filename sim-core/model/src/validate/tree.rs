@@ -34,7 +34,8 @@ impl Robot {
             }
             let before = parent_joint[joint.child].replace(joint);
             // MuJoCo's links may have several joints, one after another
-            let is_next = |first: &&Joint| self.mujoco.is_some() && first.parent == joint.parent;
+            let is_next =
+                |first: &&Joint| self.precompiled.is_some() && first.parent == joint.parent;
             if let Some(first) = before.filter(|first| !is_next(first)) {
                 return Err(Culprit::Joint(index).blame(ModelError::TwoParents {
                     robot: robot(),

@@ -242,7 +242,7 @@ fn setters_write_in_dof_order() {
         notes: vec![],
         warnings: vec![],
         urdf: None,
-        mujoco: None,
+        precompiled: None,
     };
     robot.set_joint_q(&[1.0, 2.0]).unwrap();
     robot.set_joint_effort_limit(&[f64::INFINITY, 5.0]).unwrap();

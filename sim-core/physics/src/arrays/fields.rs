@@ -81,11 +81,11 @@ pub enum Axis {
     /// Activations of actuators.
     Activations,
     /// Bodies of MuJoCo models.
-    MujocoBodies,
+    OutputBodies,
     /// Sites of MuJoCo models.
-    MujocoSites,
+    OutputSites,
     /// Geoms of MuJoCo models.
-    MujocoGeoms,
+    OutputGeoms,
     /// Scalars of the sensors of MuJoCo models.
     Sensordata,
     /// A fixed length.
@@ -108,9 +108,9 @@ impl Axis {
             Axis::Mocaps => sizes.mocaps,
             Axis::Equalities => sizes.equalities,
             Axis::Activations => sizes.activations,
-            Axis::MujocoBodies => sizes.mujoco_bodies,
-            Axis::MujocoSites => sizes.mujoco_sites,
-            Axis::MujocoGeoms => sizes.mujoco_geoms,
+            Axis::OutputBodies => sizes.output_bodies,
+            Axis::OutputSites => sizes.output_sites,
+            Axis::OutputGeoms => sizes.output_geoms,
             Axis::Sensordata => sizes.sensordata,
             Axis::Size(n) => n,
         }
@@ -131,9 +131,9 @@ impl Axis {
             Axis::Mocaps => "mocaps".into(),
             Axis::Equalities => "equalities".into(),
             Axis::Activations => "activations".into(),
-            Axis::MujocoBodies => "nbody".into(),
-            Axis::MujocoSites => "nsite".into(),
-            Axis::MujocoGeoms => "ngeom".into(),
+            Axis::OutputBodies => "nbody".into(),
+            Axis::OutputSites => "nsite".into(),
+            Axis::OutputGeoms => "ngeom".into(),
             Axis::Sensordata => "nsensordata".into(),
             Axis::Size(n) => n.to_string(),
         }

@@ -51,7 +51,7 @@ arrays! { m;
         joint_q_rest: JointQRest [m.coords] Motion "rad or m";
         joint_qd: JointQd [m.dofs.len()] Motion "rad/s or m/s"
             => "joint_qd" State [Dofs], "Joint velocities.";
-        // the solver's result, and its next start: that of `Constants::mujoco_search` between steps in MuJoCo's velocities
+        // the solver's result, and its next start: that of `Constants::prescribed_search` between steps in MuJoCo's velocities
         joint_qdd: JointQdd [m.dofs.len()] Motion "rad/s² or m/s²"
             => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
         act: Act [m.actuators.activations] Motion "–"
@@ -197,42 +197,42 @@ arrays! { m;
         passive_force: PassiveForce [Scalar; m.dofs.len()] Stage "N·m or N";
         // frames of MuJoCo models, in MuJoCo's order, frames and conventions
         xpos: Xpos [Vec3; m.outputs.bodies.len()] Stage "m"
-            => "xpos" [MujocoBodies, Size(3)], "Origin of each body of MuJoCo models in the world, the world of each model first.";
+            => "xpos" [OutputBodies, Size(3)], "Origin of each body of MuJoCo models in the world, the world of each model first.";
         xquat: Xquat [MujocoQuat; m.outputs.bodies.len()] Stage "–"
-            => "xquat" [MujocoBodies, Size(4)], "Orientation of each body of MuJoCo models in the world, (w, x, y, z).";
+            => "xquat" [OutputBodies, Size(4)], "Orientation of each body of MuJoCo models in the world, (w, x, y, z).";
         xmat: Xmat [MujocoMat; m.outputs.bodies.len()] Stage "–"
-            => "xmat" [MujocoBodies, Size(9)], "Orientation of each body of MuJoCo models in the world, a matrix row by row.";
+            => "xmat" [OutputBodies, Size(9)], "Orientation of each body of MuJoCo models in the world, a matrix row by row.";
         xipos: Xipos [Vec3; m.outputs.bodies.len()] Stage "m"
-            => "xipos" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models in the world.";
+            => "xipos" [OutputBodies, Size(3)], "Centre of mass of each body of MuJoCo models in the world.";
         ximat: Ximat [MujocoMat; m.outputs.bodies.len()] Stage "–"
-            => "ximat" [MujocoBodies, Size(9)], "Principal axes of inertia of each body of MuJoCo models in the world, a matrix row by row.";
+            => "ximat" [OutputBodies, Size(9)], "Principal axes of inertia of each body of MuJoCo models in the world, a matrix row by row.";
         site_xpos: SiteXpos [Vec3; m.outputs.sites.len()] Stage "m"
-            => "site_xpos" [MujocoSites, Size(3)], "Origin of each site of MuJoCo models in the world.";
+            => "site_xpos" [OutputSites, Size(3)], "Origin of each site of MuJoCo models in the world.";
         site_xmat: SiteXmat [MujocoMat; m.outputs.sites.len()] Stage "–"
-            => "site_xmat" [MujocoSites, Size(9)], "Orientation of each site of MuJoCo models in the world, a matrix row by row.";
+            => "site_xmat" [OutputSites, Size(9)], "Orientation of each site of MuJoCo models in the world, a matrix row by row.";
         geom_xpos: GeomXpos [Vec3; m.outputs.geoms.len()] Stage "m"
-            => "geom_xpos" [MujocoGeoms, Size(3)], "Centre of each geom of MuJoCo models in the world, also of geoms that touch nothing.";
+            => "geom_xpos" [OutputGeoms, Size(3)], "Centre of each geom of MuJoCo models in the world, also of geoms that touch nothing.";
         geom_xmat: GeomXmat [MujocoMat; m.outputs.geoms.len()] Stage "–"
-            => "geom_xmat" [MujocoGeoms, Size(9)], "Orientation of each geom of MuJoCo models in the world, a matrix row by row.";
+            => "geom_xmat" [OutputGeoms, Size(9)], "Orientation of each geom of MuJoCo models in the world, a matrix row by row.";
         // from the reference point of the body's tree
         subtree_center: SubtreeCenter [Vec3; m.outputs.bodies.len()] Stage "m";
         subtree_mass: SubtreeMass [Scalar; m.outputs.bodies.len()] Stage "kg";
         subtree_com: SubtreeCom [Vec3; m.outputs.bodies.len()] Stage "m"
-            => "subtree_com" [MujocoBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
+            => "subtree_com" [OutputBodies, Size(3)], "Centre of mass of each body of MuJoCo models with all bodies below it, in the world.";
         cvel: Cvel [Row6; m.outputs.bodies.len()] Stage "rad/s, m/s"
-            => "cvel" [MujocoBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
+            => "cvel" [OutputBodies, Size(6)], "Velocity of each body of MuJoCo models in world axes: angular, then that of the point of the body at the centre of mass of its tree, as MuJoCo's `cvel`.";
         cinert: Cinert [MujocoInertia; m.outputs.bodies.len()] Stage "kg·m², kg·m, kg"
-            => "cinert" [MujocoBodies, Size(10)], "Inertia of each body of MuJoCo models in world axes, about the point that `cvel` is about: xx, yy, zz, xy, xz, yz, then mass times the place of its centre, then mass, as MuJoCo's `cinert`; 0 for the world.";
+            => "cinert" [OutputBodies, Size(10)], "Inertia of each body of MuJoCo models in world axes, about the point that `cvel` is about: xx, yy, zz, xy, xz, yz, then mass times the place of its centre, then mass, as MuJoCo's `cinert`; 0 for the world.";
         subtree_linvel: SubtreeLinvel [Vec3; m.outputs.bodies.len()] Stage "m/s"
-            => "subtree_linvel" [MujocoBodies, Size(3)], "Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes.";
+            => "subtree_linvel" [OutputBodies, Size(3)], "Velocity of the centre of mass of each body of MuJoCo models with all bodies below it, in world axes.";
         subtree_angmom: SubtreeAngmom [Vec3; m.outputs.bodies.len()] Stage "kg·m²/s"
-            => "subtree_angmom" [MujocoBodies, Size(3)], "Angular momentum of each body of MuJoCo models with all bodies below it, about their centre of mass, in world axes.";
+            => "subtree_angmom" [OutputBodies, Size(3)], "Angular momentum of each body of MuJoCo models with all bodies below it, about their centre of mass, in world axes.";
         cacc: Cacc [Row6; m.outputs.bodies.len()] Stage "rad/s², m/s²"
-            => "cacc" [MujocoBodies, Size(6)], "Acceleration of each body of MuJoCo models less gravity, as MuJoCo's `cacc`: angular, then linear, as a spatial vector at the point that `cvel` is about.";
+            => "cacc" [OutputBodies, Size(6)], "Acceleration of each body of MuJoCo models less gravity, as MuJoCo's `cacc`: angular, then linear, as a spatial vector at the point that `cvel` is about.";
         cfrc_int: CfrcInt [Row6; m.outputs.bodies.len()] Stage "N·m, N"
-            => "cfrc_int" [MujocoBodies, Size(6)], "Torque, then force, from the parent on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_int`.";
+            => "cfrc_int" [OutputBodies, Size(6)], "Torque, then force, from the parent on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_int`.";
         cfrc_ext: CfrcExt [Row6; m.outputs.bodies.len()] Stage "N·m, N"
-            => "cfrc_ext" [MujocoBodies, Size(6)], "Torque, then force, of contacts, body_f, connects and welds on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_ext`.";
+            => "cfrc_ext" [OutputBodies, Size(6)], "Torque, then force, of contacts, body_f, connects and welds on each body of MuJoCo models, about the point that `cvel` is about, as MuJoCo's `cfrc_ext`.";
         sensordata: Sensordata [Scalar; m.sensors.scalars] Stage "–"
             => "sensordata" [Sensordata], "Sensors of MuJoCo models, in MuJoCo's order.";
 

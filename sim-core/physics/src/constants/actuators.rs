@@ -13,6 +13,8 @@ recast! {
         pub all: Vec<Actuator<R>>,
         /// How many of them have an activation.
         pub activations: usize,
+        /// Those whose force may depend on their velocity.
+        pub damped: Vec<usize>,
         /// Bounds of the sum of actuator forces on a dof.
         pub dof_bounds: Vec<ActuatorBound<R>>,
         /// Bounds of the sum of actuator forces along a tendon.
@@ -25,6 +27,7 @@ impl<R> Default for Actuators<R> {
         Actuators {
             all: Vec::new(),
             activations: 0,
+            damped: Vec::new(),
             dof_bounds: Vec::new(),
             tendon_bounds: Vec::new(),
         }

@@ -103,8 +103,8 @@ recast! {
         pub combine: FrictionCombine,
         /// Of each pair, 1 where the larger friction counts all the same; without rows where that is so of none or of all.
         pub keeps_max: Fixed,
-        /// Whether capsules and boxes have MuJoCo's points: where one of these pairs is of a geom of MuJoCo's.
-        pub mujoco_capsule_boxes: bool,
+        /// Whether capsules and boxes have the points of `collide::primitive::capsule_box`.
+        pub two_point_capsule_boxes: bool,
         /// Impedances of pairs.
         pub impedances: PairImpedances<R>,
         /// Bodies that contacts act on, among those of outputs.
@@ -498,7 +498,7 @@ impl<R: Real> Contacts<R> {
             turning: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
-            mujoco_capsule_boxes: false,
+            two_point_capsule_boxes: false,
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),
         }

@@ -88,8 +88,15 @@ recast! {
         pub integrator: Integrator,
         /// Springs and dampers.
         pub springs: Springs<R>,
-        /// Bodies of free joints whose armature and damping belong to MuJoCo's velocities.
+        /// Bodies of free joints whose armature and damping belong to the velocity of their frame.
         pub free_joints: Vec<usize>,
+        /// Dofs of all other joints: theirs belong to the dof, that is, to the diagonal of the mass matrix.
+        pub diagonal_dofs: Vec<usize>,
+        /// Free bodies that carry nothing and have more in the implicit mass matrix than their inertia: a step solves for their
+        /// accelerations with the change of their bias force.
+        pub solved_bodies: Vec<usize>,
+        /// Other free bodies that carry nothing: a step is implicit in their gyroscopic force alone.
+        pub gyroscopic_bodies: Vec<usize>,
         /// What the medium does to links.
         pub drags: Vec<Drag<R>>,
         /// Links that are held against gravity.
@@ -373,15 +380,15 @@ recast! {
 }
 
 impl<R: Real> Constants<R> {
-    /// How the solver runs as MuJoCo's: for its models in `f64`.
+    /// The path of the solver from start to end where the model prescribes it: in `f64`, in which it can be followed.
     #[inline(always)]
-    pub fn mujoco_search(&self) -> Option<&Search<R>> {
+    pub fn prescribed_search(&self) -> Option<&Search<R>> {
         self.solver.search.as_ref().filter(|_| R::DOUBLE)
     }
 
     /// Dofs for which the solver keeps islands.
     pub fn island_dofs(&self) -> usize {
-        self.mujoco_search().map_or(0, |_| self.dofs.len())
+        self.prescribed_search().map_or(0, |_| self.dofs.len())
     }
 
     /// The same constants, rounded to another precision.

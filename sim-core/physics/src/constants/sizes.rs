@@ -30,11 +30,11 @@ pub struct Sizes {
     /// Actuators with an activation.
     pub activations: usize,
     /// Bodies of MuJoCo models, the world of each included.
-    pub mujoco_bodies: usize,
+    pub output_bodies: usize,
     /// Sites of MuJoCo models.
-    pub mujoco_sites: usize,
+    pub output_sites: usize,
     /// Geoms of MuJoCo models.
-    pub mujoco_geoms: usize,
+    pub output_geoms: usize,
     /// Scalars of the sensors of MuJoCo models.
     pub sensordata: usize,
 }

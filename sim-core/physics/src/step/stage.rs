@@ -30,12 +30,28 @@ pub trait Stage {
 /// What runs a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Runs {
-    /// A step.
+    /// Either; of a step with several evaluations of its forces, the first alone.
+    Once,
+    /// Either, and in a step each evaluation of its forces.
+    Both,
+    /// A step: it moves the state.
     Step,
+    /// A step by Runge-Kutta: between its evaluations of the forces.
+    RungeKutta,
     /// An evaluation of outputs, which leaves the state as it is.
     Evaluation,
-    /// Either.
-    Both,
+}
+
+impl Runs {
+    /// Whether it changes the state.
+    pub fn moves(self) -> bool {
+        matches!(self, Runs::Step | Runs::RungeKutta)
+    }
+
+    /// Whether it runs before the state moves, in a step as well as in an evaluation of outputs.
+    pub fn is_shared(self) -> bool {
+        matches!(self, Runs::Once | Runs::Both)
+    }
 }
 
 /// A row of the list of stages.

@@ -87,7 +87,7 @@ impl Reader<'_> {
     ///
     /// Since 4.0, MuJoCo shows what an accelerometer at rest does. Before, it showed 0, also of mocap bodies.
     fn constant_acceleration(&self, of: &OnLink) -> Result<Option<[f64; 3]>, ModelError> {
-        let Some(parts) = &self.robot.mujoco else {
+        let Some(parts) = &self.robot.precompiled else {
             return Ok(None);
         };
         let root = parts.welds[of.link];

@@ -82,7 +82,7 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
     parts.geoms = rays
         .map(|(on, ray)| ray.unwrap_or_else(|| unseen(on)))
         .collect();
-    if let Some(own) = &mut robot.mujoco {
+    if let Some(own) = &mut robot.precompiled {
         own.sensors = parts;
     }
     Ok(())

@@ -116,7 +116,7 @@ impl Reader<'_> {
 
     /// The constraint that is a limit of this measure.
     pub(super) fn limit(&self, is_own: impl Fn(&Measure) -> bool) -> Option<usize> {
-        let parts = self.robot.mujoco.as_ref()?;
+        let parts = self.robot.precompiled.as_ref()?;
         parts.constraints.iter().position(|constraint| {
             matches!(constraint.law, ConstraintLaw::Range { .. }) && is_own(&constraint.measure)
         })

@@ -232,7 +232,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
                 margin: cx.constant(scalars, p, pair::REACH) + contact_slack(smaller),
                 hull_tables: &t.hulls,
                 clip_tables: t.memory.cut,
-                as_mujoco: t.mujoco_capsule_boxes,
+                two_point_capsule_boxes: t.two_point_capsule_boxes,
             };
             let near = boxes_near::<C, N>(cx, t, p, &shapes, near);
             when!(cx, near, {

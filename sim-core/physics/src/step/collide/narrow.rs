@@ -128,8 +128,8 @@ pub struct ShapePair<'a, C: Cx> {
     pub hull_tables: &'a HullTables,
     /// Scratch tables for clipping.
     pub clip_tables: Cut,
-    /// Whether a capsule and a box have MuJoCo's points; the same for all pairs of a model.
-    pub as_mujoco: bool,
+    /// Whether capsules and boxes have the points of [`super::primitive::capsule_box`]; the same for all pairs of a model.
+    pub two_point_capsule_boxes: bool,
 }
 
 impl<'a, C: Cx> ShapePair<'a, C> {

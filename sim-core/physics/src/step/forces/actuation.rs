@@ -15,7 +15,6 @@ use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
-use crate::step::tree::free_joints;
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage, param};
 
@@ -68,21 +67,18 @@ impl Stage for JointTorque {
 /// Writes `smooth_force`: applied and drive forces, less damping and bias.
 #[inline(always)]
 fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    // damping of joints is passive: the effort limit does not clamp it
-    for (k, body) in m.bodies.iter().enumerate() {
+    for body in &m.bodies {
         let torques = torques(cx, m, b, body);
-        if free_joints::has(m, k) {
-            // `springs` has their damping
-            for (j, torque) in body.dofs().zip(torques) {
-                b.work.smooth_force[j] = torque - b.work.bias_force[j];
-            }
-            continue;
-        }
-        for (j, torque) in body.dofs().zip(torques) {
-            let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
-            let applied = cx.get(&b.joint_qd[j]).fnma(damping, torque);
-            b.work.smooth_force[j] = applied - b.work.bias_force[j];
-        }
+        b.work.smooth_force[body.dofs()].copy_from_slice(&torques[..body.motion.dofs()]);
+    }
+    // damping of joints is passive: the effort limit does not clamp it. `springs` has that of free joints
+    for &j in &m.diagonal_dofs {
+        let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
+        let force = &mut b.work.smooth_force[j];
+        *force = cx.get(&b.joint_qd[j]).fnma(damping, *force);
+    }
+    for (force, bias) in b.work.smooth_force.iter_mut().zip(&b.work.bias_force) {
+        *force = *force - *bias;
     }
     if let Some(first) = m.varying.first(Param::BodyF) {
         add_link_forces(m, &b.params, first, &mut b.work);

@@ -237,19 +237,13 @@ fn bounded<F: Num>(x: F, range: Option<[F::Real; 2]>) -> F {
     }
 }
 
-/// May the force of an actuator depend on its velocity?
-pub(in crate::step) fn is_damped<R: Real>(m: &Constants<R>, actuator: &Actuator<R>) -> bool {
-    let of = |which: Param, own: [R; 3]| m.varying.first(which).is_some() || own[2].to_f64() != 0.0;
-    of(Param::ActuatorGain, actuator.gain) || of(Param::ActuatorBias, actuator.bias)
-}
-
 /// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
 /// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`), and what that has on the right-hand side in `acceleration`.
 #[inline(always)]
 pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let dt = C::F::k(m.dt);
-    let actuators = m.actuators.all.iter().enumerate();
-    for (k, actuator) in actuators.filter(|(_, actuator)| is_damped(m, actuator)) {
+    for &k in &m.actuators.damped {
+        let actuator = &m.actuators.all[k];
         let input = input(cx, b, actuator, k);
         let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
             param(m, &b.params, which, 3 * k + 2, own[2])

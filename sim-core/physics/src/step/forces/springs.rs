@@ -75,12 +75,10 @@ impl Stage for Passive {
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let mut passive = std::mem::take(&mut b.work.passive_force);
-        for (j, force) in passive.iter_mut().enumerate() {
+        passive.fill(C::F::c(0.0));
+        for &j in &m.diagonal_dofs {
             let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
-            *force = match m.free_joints.contains(&m.dofs[j].body) {
-                true => C::F::c(0.0),
-                false => -(cx.get(&b.joint_qd[j]) * damping),
-            };
+            passive[j] = -(cx.get(&b.joint_qd[j]) * damping);
         }
         add_springs(cx, m, b, &mut passive);
         free_joints::add_damping_forces(cx, m, b, &mut passive);

@@ -119,7 +119,7 @@ impl<const K: usize> Stage for RungeKutta<K> {
             for j in 0..m.dofs.len() {
                 cx.set(&mut b.joint_qdd[j], w.rk_warm_start[j]);
             }
-        } else if m.mujoco_search().is_some() {
+        } else if m.prescribed_search().is_some() {
             for (_, dof) in free_bodies(m) {
                 for j in dof..dof + 6 {
                     cx.set(&mut b.joint_qdd[j], acceleration[j]);

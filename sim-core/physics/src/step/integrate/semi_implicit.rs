@@ -86,17 +86,14 @@ impl Stage for Integrate {
                 b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
             }
         }
-        if m.mujoco_search().is_some() {
+        if m.prescribed_search().is_some() {
             keep_accelerations(cx, m, b);
+        }
+        for &body in &m.gyroscopic_bodies {
+            gyroscopic(cx, m, b, body);
         }
         for (k, body) in m.bodies.iter().enumerate() {
             if body.motion == Motion::Free {
-                // a body that carries nothing is implicit in its gyroscopic force
-                let is_alone = m.bodies.iter().all(|other| other.parent != Some(k));
-                let is_implicit = m.integrator == Integrator::ImplicitFast;
-                if is_alone && is_implicit && !free_joints::is_solved(m, k) {
-                    gyroscopic(cx, m, b, k);
-                }
                 integrate_free(cx, m, b, k);
             } else if body.motion != Motion::Mocap {
                 integrate_joint(cx, m, b, body);
@@ -131,18 +128,18 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         }
         multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
     }
-    for (j, dof) in m.dofs.iter().enumerate() {
-        let is_mujocos = free_joints::has(m, dof.body);
+    for &j in &m.diagonal_dofs {
+        let dof = &m.dofs[j];
         // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
         let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
         // nothing drives a free body
         if m.bodies[dof.body].motion != Motion::Free {
             damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);
         }
-        if !is_mujocos {
-            let diagonal = m.pattern.at(j, j);
-            w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
-        }
+        let diagonal = m.pattern.at(j, j);
+        w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
+    }
+    for j in 0..m.dofs.len() {
         w.acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
         if let Some(touching) = rounded {
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
@@ -153,12 +150,12 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         fluid::add_damping::<C>(m, b);
     }
     free_joints::add_damping(cx, m, b);
-    for body in free_joints::solved(m) {
+    for &body in &m.solved_bodies {
         free_joints::solve(cx, m, b, body);
     }
     let w = &mut b.work;
     solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
-    for body in free_joints::solved(m) {
+    for &body in &m.solved_bodies {
         free_joints::take(m, b, body);
     }
 }

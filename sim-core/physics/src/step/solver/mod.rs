@@ -153,7 +153,7 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
     let coupling = linear::coupling(cx, m, corrects);
     // a constant first: precisions that never run this are compiled without it
     if <<C::F as Num>::Real as Real>::DOUBLE
-        && let Some(search) = m.mujoco_search()
+        && let Some(search) = m.prescribed_search()
     {
         let problem = newton::Problem {
             search,

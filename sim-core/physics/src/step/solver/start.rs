@@ -20,7 +20,7 @@ pub(super) fn choose_start<C: Cx, const TURNS: bool>(
     b: &mut BlockOf<C>,
     acting: Acting,
 ) {
-    if m.mujoco_search().is_some() {
+    if m.prescribed_search().is_some() {
         take_accelerations(cx, m, b);
     }
     let n = m.dofs.len();
@@ -61,7 +61,9 @@ pub(super) fn choose_start<C: Cx, const TURNS: bool>(
     contacts::cost::<_, TURNS>(cx, &m.contacts, row::JAR, &mut cost_warm);
     contacts::cost::<_, TURNS>(cx, &m.contacts, row::AHEAD, &mut cost_smooth);
     let mut cheaper = cx.get(&cost_smooth).lt(cx.get(&cost_warm));
-    if m.mujoco_search().is_some_and(|search| !search.warm_start) {
+    if m.prescribed_search()
+        .is_some_and(|search| !search.warm_start)
+    {
         cheaper = cheaper | !cheaper;
     }
     for j in 0..n {

@@ -17,13 +17,11 @@
 //! ```
 
 use crate::arrays::{Block, Workspace};
-use crate::constants::options::Integrator;
+use crate::constants::Constants;
 use crate::constants::params::Param;
-use crate::constants::{Constants, Motion};
-use crate::lane::{Cx, Num, Real, map};
+use crate::lane::{Cx, Num, map};
 use crate::math::spatial::Inertia;
 use crate::math::vec3::Vec3;
-use crate::step::forces::actuators::is_damped;
 use crate::step::{BlockOf, ConstantsOf, param};
 
 /// Armature or damping of the dofs of a free body, linear and angular, in MuJoCo's velocities.
@@ -45,12 +43,6 @@ fn of_dofs<F: Num>(
         both[i / 3][i % 3] = param(m, params, which, first + i, fixed);
     }
     both
-}
-
-/// Does a free body have armature and damping as MuJoCo has them?
-#[inline(always)]
-pub(in crate::step) fn has<R>(m: &Constants<R>, body: usize) -> bool {
-    m.free_joints.contains(&body)
 }
 
 #[inline(always)]
@@ -166,10 +158,11 @@ pub(in crate::step) fn add_armature<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     w: &mut Workspace<F>,
-    body: usize,
 ) {
-    let armature = of_dofs(m, params, Param::JointArmature, body);
-    add_block(m, w, body, armature);
+    for &body in &m.free_joints {
+        let armature = of_dofs(m, params, Param::JointArmature, body);
+        add_block(m, w, body, armature);
+    }
 }
 
 /// Adds Tᵀ A T a to the forces that accelerations need, `missing`.
@@ -208,30 +201,6 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Bl
         let to = &mut w.acceleration[first..first + 6];
         subtract(to, [force, Vec3::zero()], rotation, origin);
     }
-}
-
-/// Free bodies that carry nothing and whose mass matrix has more than their inertia in a step: [`solve`] finds their
-/// accelerations.
-pub(in crate::step) fn solved<R: Real>(m: &Constants<R>) -> impl Iterator<Item = usize> + '_ {
-    let bodies = (0..m.bodies.len()).filter(|&k| is_solved(m, k));
-    bodies.filter(|_| m.integrator == Integrator::ImplicitFast)
-}
-
-/// Is a body one of [`solved`], where the integrator is implicit?
-pub(in crate::step) fn is_solved<R: Real>(m: &Constants<R>, body: usize) -> bool {
-    // first what rules out most bodies
-    let is_free = m.bodies[body].motion == Motion::Free;
-    if !is_free && !has(m, body) {
-        return false;
-    }
-    let is_alone = m.bodies.iter().all(|other| other.parent != Some(body));
-    let drags = m.drags.iter().any(|drag| drag.body == body);
-    let mut actuators = m.actuators.all.iter().filter(|own| is_damped(m, own));
-    let driven = actuators.any(|own| {
-        let dofs = own.turning.iter().flat_map(|length| &length.dofs);
-        dofs.into_iter().any(|&dof| m.dofs[dof].body == body)
-    });
-    is_alone && (has(m, body) || (drags || driven) && is_free)
 }
 
 /// Solves (H + h N) a = b for a free body, H its block of the mass matrix and b its part of `acceleration`; leaves a in `minimum`.

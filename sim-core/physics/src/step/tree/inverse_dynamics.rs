@@ -65,11 +65,8 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
         }
     }
     // the rotor of a drive
-    for (j, dof) in m.dofs.iter().enumerate() {
-        if free_joints::has(m, dof.body) {
-            continue;
-        }
-        let armature = param(m, &b.params, Param::JointArmature, j, dof.armature);
+    for &j in &m.diagonal_dofs {
+        let armature = param(m, &b.params, Param::JointArmature, j, m.dofs[j].armature);
         b.work.missing[j] = armature.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
     }
     free_joints::add_armature_forces(cx, m, b);

@@ -62,18 +62,18 @@ impl Stage for MassMatrix {
                         w.mass_matrix[entry.place] = x;
                     }
                 }
-                w.mass_matrix[own.place] = match free_joints::has(m, k) {
-                    true => diagonal,
-                    false => diagonal + param(m, params, Param::JointArmature, i, dof.armature),
-                };
-            }
-            if free_joints::has(m, k) {
-                free_joints::add_armature(m, params, w, k);
+                w.mass_matrix[own.place] = diagonal;
             }
             if let Some(parent) = body.parent {
                 w.inertia[parent] = w.inertia[parent] + composite.moved(w.arm[k]);
             }
         }
+        for &j in &m.diagonal_dofs {
+            let own = m.pattern.at(j, j);
+            let armature = param(m, params, Param::JointArmature, j, m.dofs[j].armature);
+            w.mass_matrix[own] = w.mass_matrix[own] + armature;
+        }
+        free_joints::add_armature(m, params, w);
     }
 }
 

@@ -27,7 +27,7 @@ fn every_recorded_stage_gives_the_bits_of_the_scalar_run() {
             let mut memory = memory(m);
             // outputs belong to the state before it moves on
             let (moves, others): (Vec<_>, Vec<_>) =
-                needed(m).partition(|stage| stage.row().runs == Runs::Step);
+                needed(m).partition(|stage| stage.row().runs.moves());
             for stage in others.into_iter().chain(moves) {
                 let recorded = recordings[stage.index()].as_ref();
                 let (recording, packed, splits) = recorded.expect("it is needed");

@@ -15,8 +15,7 @@ use sim_physics::constants::contact::Cone;
 use sim_physics::constants::contact::PAIR_KINDS;
 use sim_physics::every_stage;
 use sim_physics::lane::memory::Cpu;
-use sim_physics::schedule::step_stages;
-use sim_physics::step::{Runs, Stage, StageId};
+use sim_physics::step::{Stage, StageId, step_stages};
 use sim_physics::times;
 use sim_record::wgsl::{ProgramOptions, wgsl};
 use sim_record::{Recorder, Recording};
@@ -55,7 +54,7 @@ fn needed(m: &Constants<f32>) -> impl Iterator<Item = StageId> {
 
 /// The stages of a step that leave the state as it is.
 fn before_integrate(m: &Constants<f32>) -> impl Iterator<Item = StageId> {
-    needed(m).filter(|stage| stage.row().runs == Runs::Both)
+    needed(m).filter(|stage| stage.row().runs.is_shared())
 }
 
 /// Arrays that a stage leaves for others.

@@ -165,7 +165,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             margin,
             hull_tables: &t.hulls,
             clip_tables: t.memory.cut,
-            as_mujoco: false,
+            two_point_capsule_boxes: false,
         };
         let mut out = points_of::<C>(cx, t, p, center, origin);
         let mut found = candidates(cx, t.memory.field_candidates, &out);

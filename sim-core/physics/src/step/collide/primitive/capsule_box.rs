@@ -82,7 +82,7 @@ struct Beside<F> {
 
 /// Capsule and box: at most two points, those of MuJoCo.
 #[inline(always)]
-pub(in crate::step::collide) fn mujoco_capsule_box<C: Cx>(
+pub(in crate::step::collide) fn two_point_capsule_box<C: Cx>(
     cx: &mut C,
     pair: &ShapePair<'_, C>,
     axis: &CapsuleAxis<C::F>,

@@ -3,7 +3,7 @@
 //! The capsule's centre is the origin, its axis is z of its frame. A contact point of a capsule is that of the sphere around
 //! a point of its axis, so both functions look for points of the axis.
 
-use super::capsule_box::mujoco_capsule_box;
+use super::capsule_box::two_point_capsule_box;
 use super::spheres::{Ball, BoxExit, add_sphere_box, add_sphere_sphere};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
@@ -97,8 +97,8 @@ fn add_balls<C: Cx>(
     add_sphere_sphere(cx, pair, &a, &b, out);
 }
 
-/// Capsule and box, unless MuJoCo's points are wanted ([`super::capsule_box`]): the sphere around the point of the axis that is nearest to the box, and those around the ends of the
-/// part of the axis over the face or edge which that sphere touches.
+/// Capsule and box, unless the points of [`super::capsule_box`] are wanted: the sphere around the point of the axis that is
+/// nearest to the box, and those around the ends of the part of the axis over the face or edge which that sphere touches.
 #[inline(always)]
 pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let c = C::F::c;
@@ -109,8 +109,8 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
         along: b.axes.transpose_mul(pair.axes_a[2]),
         half_height,
     };
-    if pair.as_mujoco {
-        return mujoco_capsule_box(cx, pair, &axis, out);
+    if pair.two_point_capsule_boxes {
+        return two_point_capsule_box(cx, pair, &axis, out);
     }
     let size = half[0] + half[1] + half[2] + half_height + radius;
     let nearest = axis.nearest_to_box(half);

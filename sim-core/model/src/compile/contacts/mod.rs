@@ -1,12 +1,19 @@
 //! Contacts of a scene: pairs of shapes, sorted into classes whose contacts depend on the same dofs.
 
-use super::clusters::clusters;
-use super::contact_pairs::ContactBuilder;
-use super::contact_pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
-use super::fields::add_fields;
-use super::mujoco_contacts::add_touched_bodies;
+pub(super) mod clusters;
+mod fields;
+mod memory;
+mod pairs;
+pub(super) mod pieces;
+pub(super) mod sensors;
+
 use crate::description::Description;
 use crate::error::ModelError;
+use clusters::clusters;
+use fields::add_fields;
+use pairs::ContactBuilder;
+use pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
+use sensors::add_touched_bodies;
 use sim_physics::constants::contact::{
     Class, Column, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run, pair, row,
 };
@@ -130,7 +137,7 @@ impl ContactBuilder<'_> {
             contacts.tables.numbers.extend(ratios.as_flattened());
         }
         self.add_combine(contacts, pairs);
-        contacts.mujoco_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
+        contacts.two_point_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
         let coupled = self.coupled(contacts);
         for class in &mut contacts.classes {
             let pattern = match class.couples {

@@ -1,6 +1,6 @@
 //! Tables of height fields: elevations, the highest of each cell and around each tile, and how many cells each pair visits.
 
-use super::contact_pieces::{Piece, PlacedShape};
+use super::pieces::{Piece, PlacedShape};
 use crate::description::Shape;
 use crate::error::ModelError;
 use crate::geometry::{HeightField, SAMPLES_MAX};

@@ -1,7 +1,7 @@
 //! Room for contacts: how many there may be, and where their tables and rows lie.
 
-use super::contact_pairs::{ContactBuilder, rows_of};
-use super::contact_pieces::Piece;
+use super::pairs::{ContactBuilder, rows_of};
+use super::pieces::Piece;
 use sim_physics::constants::clip::Cut;
 use sim_physics::constants::contact::{
     COUNTS, Contacts, Handles, Kind, Memory, pair, row, turning,

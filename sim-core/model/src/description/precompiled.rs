@@ -1,8 +1,8 @@
 //! What a robot that MuJoCo compiled has beyond links and joints.
 
-use super::mujoco_constraints::{Constraint, Tendon};
-use super::mujoco_frames::FrameParts;
-use super::mujoco_sensors::SensorParts;
+use super::constraints::{Constraint, Tendon};
+use super::output_frames::FrameParts;
+use super::sensors::SensorParts;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
@@ -11,7 +11,7 @@ use sim_physics::constants::options::Integrator;
 
 /// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MujocoParts {
+pub struct Precompiled {
     /// Translational inverse weight of each link, `body_invweight0` [1/kg].
     pub link_inverse_weight: Vec<f64>,
     /// Inverse weight of each dof, `dof_invweight0` [1/(kg·m²) or 1/kg].
@@ -19,7 +19,7 @@ pub struct MujocoParts {
     /// Mean of the diagonal of the mass matrix, `stat.meaninertia`.
     pub mean_inertia: f64,
     /// What each joint has, in their order.
-    pub joints: Vec<MujocoJoint>,
+    pub joints: Vec<JointExtras>,
     /// Equalities, by name and whether they act at the start.
     pub equalities: Vec<(String, bool)>,
     /// Constraints.
@@ -68,7 +68,7 @@ pub struct MujocoParts {
 
 /// What a joint from MuJoCo has beyond one from URDF.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MujocoJoint {
+pub struct JointExtras {
     /// Its anchor in the frame of its link [m].
     pub anchor: [f64; 3],
     /// Its position in the pose that the model was built in [rad or m].

@@ -1,6 +1,6 @@
 //! Sensors of a robot that MuJoCo compiled.
 
-use super::mujoco_frames::OnLink;
+use super::output_frames::OnLink;
 pub use sim_physics::constants::sensors::{FramePart, LimitPart, Reduction, SubtreePart, ZoneKind};
 
 /// The sensors of a robot, in MuJoCo's order.

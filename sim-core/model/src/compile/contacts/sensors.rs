@@ -1,7 +1,7 @@
 //! Which bodies of MuJoCo models contacts act on, and which sensors they are of.
 
-use super::contact_pieces::PlacedShape;
-use crate::description::{Description, MujocoParts, Sense, Shape, Touching};
+use super::pieces::PlacedShape;
+use crate::description::{Description, Precompiled, Sense, Shape, Touching};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, TouchedBodies};
 use sim_physics::constants::sensors::SensorKind;
@@ -57,7 +57,7 @@ struct Side {
 }
 
 /// Gives sensors of contacts the pairs of shapes that they are of.
-pub(super) fn add_contact_sensors(
+pub(in crate::compile) fn add_contact_sensors(
     constants: &mut Constants<f64>,
     scene: &Description,
     shapes: &[PlacedShape<'_>],
@@ -76,7 +76,7 @@ pub(super) fn add_contact_sensors(
     let mut sensors = constants.sensors.all.iter_mut();
     let mut records = 0;
     for (robot, robot_parts) in scene.robots.iter().enumerate() {
-        let Some(parts) = &robot_parts.mujoco else {
+        let Some(parts) = &robot_parts.precompiled else {
             continue;
         };
         for sense in parts
@@ -169,7 +169,7 @@ fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
         };
         let collision = place.2 - 1;
         let geom = shape.robot.and_then(|robot| {
-            let parts = scene.robots[robot].mujoco.as_ref()?;
+            let parts = scene.robots[robot].precompiled.as_ref()?;
             let geoms = parts.frames.geoms.iter().zip(&parts.frames.collisions);
             geoms.enumerate().find_map(|(geom, (on, own))| {
                 (on.link == shape.own_link && *own == Some(collision)).then_some(geom)
@@ -196,7 +196,7 @@ fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
 }
 
 /// Is a shape of an object of a model?
-fn is_of(parts: &MujocoParts, robot: usize, side: &Side, what: Touching) -> bool {
+fn is_of(parts: &Precompiled, robot: usize, side: &Side, what: Touching) -> bool {
     let Some((_, link, geom)) = side.of.filter(|(other, ..)| *other == robot) else {
         return matches!(what, Touching::Anything | Touching::InZone);
     };

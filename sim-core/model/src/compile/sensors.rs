@@ -2,7 +2,7 @@
 
 use super::bodies::BodyBuilder;
 use super::carrier::Carrier;
-use super::mujoco_frames::mounted_on;
+use super::output_frames::mounted_on;
 use super::ties::terms;
 use crate::description::{Robot, Sense, SensorParts, ZonePart};
 use crate::model::SensorInfo;
@@ -44,7 +44,9 @@ impl BodyBuilder {
         carriers: &[Carrier],
         [first_body, first_actuator, first_constraint]: [usize; 3],
     ) {
-        let Some(parts) = &robot.mujoco else { return };
+        let Some(parts) = &robot.precompiled else {
+            return;
+        };
         let first = self.sensors.scalars;
         let refused = parts.sensors.refused.iter();
         self.sensor_infos

@@ -1,7 +1,8 @@
 //! Convex pieces of the shapes of a scene, and the pairs of pieces that may touch.
 
-use super::carrier::Carrier;
-use crate::description::{ContactPair, Description, Joint, MujocoParts, Robot};
+use super::super::carrier::Carrier;
+use super::super::inverse_weight::Reference;
+use crate::description::{ContactPair, Description, Joint, Precompiled, Robot};
 use crate::error::ModelError;
 use crate::geom_contact::GeomContact;
 use crate::geometry::{Hull, Shape};
@@ -16,7 +17,7 @@ use sim_physics::constants::height_field::FIELD_CONTACTS;
 use std::collections::BTreeSet;
 
 /// A shape of the scene, with what carries it.
-pub(super) struct PlacedShape<'a> {
+pub(in crate::compile) struct PlacedShape<'a> {
     /// Its number among the scene's.
     pub number: usize,
     /// Its geometry and surface; its pose is that in the link.
@@ -44,15 +45,32 @@ pub(super) struct PlacedShape<'a> {
 }
 
 /// What decides, besides the shapes, which pairs touch.
-pub(super) struct Rules<'a> {
+pub(in crate::compile) struct Rules<'a> {
     /// Groups of links that a joint connects.
     pub connected: Vec<(usize, usize)>,
     /// Robots whose links touch each other.
     pub self_collisions: Vec<bool>,
     /// Translational inverse weight of each link.
     pub link_inverse_weight: &'a [f64],
-    /// Of each robot, what it has from MuJoCo.
-    pub mujoco: Vec<Option<&'a MujocoParts>>,
+    /// Of each robot, what it has if it comes compiled.
+    pub precompiled: Vec<Option<&'a Precompiled>>,
+}
+
+impl<'a> Rules<'a> {
+    pub fn new(
+        scene: &'a Description,
+        carriers: &[Vec<Carrier>],
+        m: &Constants<f64>,
+        reference: &'a Reference,
+    ) -> Rules<'a> {
+        let robots = scene.robots.iter();
+        Rules {
+            connected: connected(scene, carriers, m),
+            self_collisions: robots.clone().map(|robot| robot.self_collisions).collect(),
+            link_inverse_weight: &reference.link_inverse_weight,
+            precompiled: robots.map(|robot| robot.precompiled.as_deref()).collect(),
+        }
+    }
 }
 
 /// How a shape touches a geom of MuJoCo's.
@@ -97,7 +115,7 @@ fn group(constants: &Constants<f64>, robot: usize, carrier: &Carrier) -> usize {
 }
 
 /// All shapes of a scene, in the order of their names.
-pub(super) fn placed_shapes<'a>(
+pub(in crate::compile) fn placed_shapes<'a>(
     scene: &'a Description,
     carriers: &[Vec<Carrier>],
     constants: &Constants<f64>,
@@ -172,7 +190,7 @@ fn part(robot: &Robot, carriers: &[Carrier], link: usize) -> usize {
 }
 
 /// Groups of links that a joint connects.
-pub(super) fn connected(
+fn connected(
     scene: &Description,
     carriers: &[Vec<Carrier>],
     constants: &Constants<f64>,
@@ -335,7 +353,7 @@ pub(super) fn pairs(
 }
 
 /// Whether two geoms of one robot from MuJoCo may touch, as MuJoCo filters them.
-fn geoms_may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, parts: &MujocoParts) -> bool {
+fn geoms_may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, parts: &Precompiled) -> bool {
     let links = [a.own_link, b.own_link];
     let welds = links.map(|link| parts.welds[link]);
     let above = welds.map(|weld| parts.welds[parts.parents[weld]]);
@@ -354,7 +372,7 @@ pub(super) fn named_pair<'a>(
     b: &PlacedShape<'_>,
     rules: &Rules<'a>,
 ) -> Option<&'a ContactPair> {
-    let parts = rules.mujoco[a.robot.filter(|_| a.robot == b.robot)?]?;
+    let parts = rules.precompiled[a.robot.filter(|_| a.robot == b.robot)?]?;
     let geoms = [a, b].map(|shape| (shape.own_link, shape.place));
     let mut pairs = parts.pairs.iter();
     pairs.find(|pair| pair.geoms == geoms || pair.geoms == [geoms[1], geoms[0]])
@@ -368,7 +386,7 @@ fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> boo
         }
         let [first, second] = [a, b].map(|shape| geom_of(shape));
         let filter = match (a.robot, b.robot) {
-            (Some(first), Some(second)) if first == second => rules.mujoco[first],
+            (Some(first), Some(second)) if first == second => rules.precompiled[first],
             _ => None,
         };
         let passes = filter.is_none_or(|parts| geoms_may_touch(a, b, parts));

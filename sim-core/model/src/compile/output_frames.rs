@@ -2,14 +2,14 @@
 
 use super::carrier::Carrier;
 use super::sites::mounted;
-use crate::description::{MujocoParts, OnLink};
+use crate::description::{OnLink, Precompiled};
 use sim_physics::constants::outputs::{OutputBody, OutputFrames};
 use sim_physics::constants::site::Mount;
 
 /// Adds the frames of a model. `carriers` has an entry for each of its links, `first_link` is the number of the first.
 pub(super) fn add_frames(
     frames: &mut OutputFrames<f64>,
-    parts: &MujocoParts,
+    parts: &Precompiled,
     carriers: &[Carrier],
     first_link: usize,
 ) {

@@ -62,7 +62,7 @@ pub(super) fn clusters(
 }
 
 /// The dofs that move a body, rising.
-pub(super) fn path(bodies: &[Body<f64>], body: usize) -> Vec<usize> {
+pub(in crate::compile) fn path(bodies: &[Body<f64>], body: usize) -> Vec<usize> {
     let mut dofs = Vec::new();
     let mut next = Some(body);
     while let Some(b) = next {

@@ -1,8 +1,8 @@
 //! Pairs of convex pieces as table rows: what the narrow phase and the contact constraints read of each pair.
 
+use super::super::constraint_rows::{IMPEDANCE, contact_damping};
 use super::clusters::Cluster;
-use super::constraint_rows::{IMPEDANCE, contact_damping};
-use super::contact_pieces::{Piece, PlacedShape, Rules, geom_of, named_pair};
+use super::pieces::{Piece, PlacedShape, Rules, geom_of, named_pair};
 use crate::description::Description;
 use crate::geom_contact::GeomContact;
 use crate::softness::Softness;
@@ -113,7 +113,7 @@ impl ContactBuilder<'_> {
         if let Some(geom) = geom {
             let is_safe = self
                 .rules
-                .mujoco
+                .precompiled
                 .iter()
                 .flatten()
                 .all(|m| m.safe_references);
