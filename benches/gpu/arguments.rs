@@ -85,21 +85,6 @@ pub struct Arguments {
     /// What else the head of the file says, as `name: value`.
     #[arg(long)]
     pub fact: Vec<String>,
-    /// Writes the kernels of the scenes and states of their runs to this folder, without a GPU: benches/gpu/offline reads them.
-    #[arg(long)]
-    pub dump: Option<PathBuf>,
-    /// Frames before and after which the states are written.
-    #[arg(long, value_delimiter = ',', default_value = "40")]
-    pub frames: Vec<usize>,
-    /// Writes the kernels of the software driver, not those of hardware.
-    #[arg(long)]
-    pub software: bool,
-    /// Threads that share a world, where contacts can be.
-    #[arg(long, default_value_t = 8)]
-    pub lanes: usize,
-    /// The adapter steps the worlds of the dump, not the CPU.
-    #[arg(long)]
-    pub on_adapter: bool,
     /// Only builds the first scene, with its programs in this folder, and tells how long it took [s]: run by `build_time`.
     #[arg(long, hide = true)]
     pub build_in: Option<PathBuf>,

@@ -11,11 +11,10 @@
 #   1  results beside MuJoCo; bits for 1 to 65,536 worlds    180   log.txt
 #   2  speed of all scenes, commands to arrays               420   speed.csv
 #   3  threads per world, cuts of kernels                    240   splits.csv
-#   4  measured beside predicted                              10   predicted.csv
-#   5  tensors without copies                                 90   tensors.csv
-#   6  time stamps of the kernels, what the profiler sees    120   profile.txt
-#   7  MuJoCo-Warp and MJX, or published figures             300   peers.csv or published.csv
-#   8  the CPU of this machine                               120   speed.csv
+#   4  tensors without copies                                 90   tensors.csv
+#   5  time stamps of the kernels, what the profiler sees    120   profile.txt
+#   6  MuJoCo-Warp and MJX, or published figures             300   peers.csv or published.csv
+#   7  the CPU of this machine                               120   speed.csv
 #
 # A stage consists of pieces, a command each. pieces.csv has a line for each piece: state, key, seconds, date, clocks after it.
 # A call skips the pieces that are done, so it goes on where another was cut off or killed. stamp.txt has the commit, the
@@ -26,13 +25,12 @@
 #   CARD_SECONDS   limit of a call (default 540)
 #   CARD_QUICK=1   small numbers, to try the script on a software driver
 #   CARD_ADAPTER   index or part of the name of the adapter
-#   CARD_ARCH      predictions to compare with: sm_80, sm_90 or sm_120 (default: by the adapter's name)
 set -u
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 results=${CARD_RESULTS:-$here/results}
 began=$SECONDS
 call_limit=${CARD_SECONDS:-540}
-limits=(0 180 420 240 10 90 120 300 120)
+limits=(0 180 420 240 90 120 300 120)
 mkdir -p "$results" "$here/cache" || exit 1
 log=$results/log.txt pieces=$results/pieces.csv
 commit=$(cat "$here/commit")
@@ -173,7 +171,7 @@ check_stamp() {
 # Python with the packages of the folder; `python` stays empty where there is none.
 packages() {
   python=$(command -v python3 || true)
-  [ -n "$python" ] || { say "python3 is not installed: the stages 4, 5 and 7 and the report need it"; return; }
+  [ -n "$python" ] || { say "python3 is not installed: the stages 4 and 6 and the report need it"; return; }
   export PYTHONPATH="$here/site${PYTHONPATH:+:$PYTHONPATH}" PYTHONDONTWRITEBYTECODE=1
   [ -d "$here/site" ] && return
   time_is_up && return
@@ -228,14 +226,7 @@ stage_3() {
 }
 
 stage_4() {
-  # anew in each call: what was measured since then belongs to it
-  time_is_up && return
-  sed -i '/^done,4\//d' "$pieces"
-  python_piece 4/predicted "$here/benches/gpu/card_report.py" predicted "$results"
-}
-
-stage_5() {
-  is_done 5/tensors || python_piece 5/tensors "$here/benches/gpu/tensors.py" --if-possible --csv "$results/tensors.csv" \
+  is_done 4/tensors || python_piece 4/tensors "$here/benches/gpu/tensors.py" --if-possible --csv "$results/tensors.csv" \
     ${CARD_ADAPTER:+--adapter "$CARD_ADAPTER"} --fact "commit: $commit" --fact "driver: $driver" \
     --fact "clocks before: $(clocks)" "${tensors[@]}"
 }
@@ -266,19 +257,19 @@ profiled() {
   return "$rc"
 }
 export -f profiled
-stage_6() {
+stage_5() {
   export scenes timed_worlds split_scenes split_worlds seconds
-  piece 6/profile bash -c 'profiled >"$0" 2>&1' "$results/profile.txt"
+  piece 5/profile bash -c 'profiled >"$0" 2>&1' "$results/profile.txt"
 }
 
-stage_7() {
+stage_6() {
   local file=$results/peers.csv
   time_is_up && return
   if [ -n "$python" ] && limited 60 "$python" "$here/benches/gpu/gpu_peers.py" --installed >>"$log" 2>&1; then
     for worlds in $counts; do
       for scene in $scenes; do
         [ "$scene" = standing ] && continue
-        python_piece "7/$scene-$worlds" "$here/benches/gpu/gpu_peers.py" --scenes "$scene" --worlds "$worlds" --seconds "$seconds" \
+        python_piece "6/$scene-$worlds" "$here/benches/gpu/gpu_peers.py" --scenes "$scene" --worlds "$worlds" --seconds "$seconds" \
           --fact "commit: $commit" --csv "$file" --append
       done
     done
@@ -287,15 +278,15 @@ stage_7() {
   if grep -qv -e '^#' -e '^scene,' "$file" 2>/dev/null; then
     rm -f "$results/published.csv"
   else
-    say "7: neither MuJoCo-Warp nor MJX is measured here (log.txt says why): published.csv has published figures"
+    say "6: neither MuJoCo-Warp nor MJX is measured here (log.txt says why): published.csv has published figures"
     cp "$here/benches/gpu/published.csv" "$results"
     publish
   fi
 }
 
-stage_8() {
+stage_7() {
   for worlds in $counts; do
-    for scene in $scenes; do measured "8/$scene-$worlds" cpu "$scene" "$worlds" --csv "$results/speed.csv"; done
+    for scene in $scenes; do measured "7/$scene-$worlds" cpu "$scene" "$worlds" --csv "$results/speed.csv"; done
   done
 }
 
@@ -312,13 +303,13 @@ if command -v nvidia-smi >/dev/null; then
 else
   say "nvidia-smi is not installed: clocks, power and load are unknown"
 fi
-for stage in "${@:-1 2 3 4 5 6 7 8}"; do
+for stage in "${@:-1 2 3 4 5 6 7}"; do
   for number in $stage; do
     time_is_up && break 2
-    case $number in [1-8]) "stage_$number" ;; *) say "stage $number: unknown; give numbers from 1 to 8"; exit 1 ;; esac
+    case $number in [1-7]) "stage_$number" ;; *) say "stage $number: unknown; give numbers from 1 to 7"; exit 1 ;; esac
   done
 done
-[ -n "$python" ] && "${guard[@]}" timeout -k 2 10 "$python" "$here/benches/gpu/card_report.py" summary "$results" 2>&1 | tee -a "$log"
+[ -n "$python" ] && "${guard[@]}" timeout -k 2 10 "$python" "$here/benches/gpu/card_report.py" "$results" 2>&1 | tee -a "$log"
 publish
 if [ "$waiting" = 1 ]; then
   say "time is up: call card.sh again"

@@ -10,7 +10,7 @@ shift
 cd "$(dirname "$0")/../.."
 most=40 # [MB]
 rm -rf "$folder"
-mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/physics" "$folder/benches/results" "$folder/examples" "$folder/tests/python/mujoco"
+mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/physics" "$folder/examples" "$folder/tests/python/mujoco"
 strip -o "$folder/gpu_bench" "${CARGO_TARGET_DIR:-target}/release/examples/gpu_bench"
 gzip -6 "$folder/gpu_bench"
 cp .venv/wheels/*.whl "$@" "$folder/wheels"
@@ -21,7 +21,6 @@ for name in libvulkan.so.1 libEGL.so.1 libGL.so.1 libGLX.so.0 libGLdispatch.so.0
 done
 cp benches/gpu/card.sh "$folder"
 cp benches/gpu/card_report.py benches/gpu/gpu_peers.py benches/gpu/tensors.py benches/gpu/published.csv "$folder/benches/gpu"
-cp -r benches/results/gpu_offline "$folder/benches/results"
 # what gpu_peers.py imports, and the robots of these
 cp -r benches/record.py benches/robots "$folder/benches"
 cp benches/physics/contacts.py benches/physics/legged.py "$folder/benches/physics"

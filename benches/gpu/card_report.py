@@ -1,7 +1,6 @@
-"""Tables of what card.sh has measured: beside the predictions, and all in short.
+"""Tables of what card.sh has measured, in short.
 
-    python card_report.py predicted RESULTS
-    python card_report.py summary RESULTS
+    python card_report.py RESULTS
 
 It needs nothing but Python, since it runs where nothing can be installed.
 """
@@ -9,19 +8,10 @@ It needs nothing but Python, since it runs where nothing can be installed.
 from __future__ import annotations
 
 import csv
-import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-PREDICTIONS = HERE.parent / "results/gpu_offline/predictions.csv"
-# Patterns of adapters' names, and the architecture that their kernels are compiled for. The RTX 5000 is older.
-ARCHITECTURES = {r"\bH[12]00\b": "sm_90", r"\bA100\b": "sm_80", r"\bRTX 50[5-9]0\b": "sm_120"}
-UNPREDICTED = "no prediction for this card"
-# A prediction that is off by more is named
-FACTOR_MAX = 1.5
 Row = dict[str, str]
 
 
@@ -46,93 +36,10 @@ def facts(path: Path) -> Row:
     return dict(pairs)
 
 
-def architecture(adapter: str) -> str | None:
-    """The architecture whose predictions are compared: of the environment or of the adapter; None of another card."""
-    named = (arch for pattern, arch in ARCHITECTURES.items() if re.search(pattern, adapter))
-    return os.environ.get("CARD_ARCH") or next(named, None)
-
-
-def predictions(arch: str) -> dict[tuple[str, str], Row]:
-    """The latest prediction of each scene and number of worlds."""
-    with PREDICTIONS.open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["arch"] == arch]
-    if not rows:
-        raise SystemExit(f"CARD_ARCH={arch}: no predictions in {PREDICTIONS}; give sm_80, sm_90 or sm_120")
-    return {(row["scene"], row["worlds"]): row for row in rows}
-
-
 def pieces(results: Path) -> dict[str, str]:
     """The last state of each piece."""
-    return {key: state for key, (state, _) in last(results).items()}
-
-
-def last(results: Path) -> dict[str, tuple[str, str]]:
-    """The last state of each piece and its date."""
     lines = (results / "pieces.csv").read_text().splitlines()
-    return {key: (state, date[:10]) for state, key, _, date, *_ in (line.split(",") for line in lines)}
-
-
-def beside(measured: str, one: Row | None) -> Row:
-    """The columns of a prediction, beside a measured rate [steps/s]."""
-    if one is None:
-        names = ("prediction_commit", "predicted_steps_per_s", "measured_over_predicted", "beyond")
-        return {"predicted_for": UNPREDICTED, **dict.fromkeys(names, "–")}
-    predicted = 1e6 * float(one["steps_per_s_million"])
-    factor = float(measured) / predicted
-    return {
-        "predicted_for": one["card"],
-        "prediction_commit": one["commit"],
-        "predicted_steps_per_s": f"{predicted:.0f}",
-        "measured_over_predicted": f"{factor:.3g}",
-        "beyond": "no" if 1 / FACTOR_MAX <= factor <= FACTOR_MAX else "yes",
-    }
-
-
-def predict(results: Path) -> list[Row]:
-    """Measured rates of whole runs over predicted ones."""
-    speed = results / "speed.csv"
-    head = facts(speed)
-    adapter = head.get("adapter", "unknown")
-    arch = architecture(adapter)
-    expected = predictions(arch) if arch else {}
-    states = last(results)
-    rows = []
-    for row in read(speed):
-        one = expected.get((row["scene"], row["worlds"]))
-        if row["steps_per_s"] == "–" or (arch and one is None):
-            continue
-        _, date = states.get(f"2/{row['scene']}-{row['worlds']}", ("", head.get("date", "unknown")))
-        checked, _ = states.get(f"1/{row['scene']}", ("", ""))
-        rows.append(
-            {
-                "scene": row["scene"],
-                "worlds": row["worlds"],
-                "adapter": adapter,
-                "commit": head.get("commit", "unknown"),
-                "date": date,
-                "measured_steps_per_s": row["steps_per_s_whole"],
-                **beside(row["steps_per_s_whole"], one),
-                "checked": "yes" if checked == "done" else "no",
-            }
-        )
-    return rows
-
-
-def write_predicted(results: Path) -> None:
-    """Writes predicted.csv below the facts of the measured rates."""
-    rows = predict(results)
-    if not rows:
-        print("nothing is measured that was predicted")
-        return
-    with (results / "predicted.csv").open("w", newline="") as file:
-        file.writelines(f"# {name}: {value}\n" for name, value in facts(results / "speed.csv").items())
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    beside_one = [row for row in rows if row["predicted_for"] != UNPREDICTED]
-    print(f"{len(beside_one)} rates beside predictions")
-    if len(beside_one) < len(rows):
-        print(f"{rows[0]['adapter']}: {UNPREDICTED}; CARD_ARCH compares it with that of another")
+    return {key: state for state, key, *_ in (line.split(",") for line in lines)}
 
 
 def show(title: str, rows: list[Row], columns: Sequence[str]) -> None:
@@ -148,7 +55,7 @@ def show(title: str, rows: list[Row], columns: Sequence[str]) -> None:
 
 
 def summary(results: Path) -> None:
-    """Prints what there is, and names what is wrong, what is missing, and which predictions are far off."""
+    """Prints what there is, and names what is wrong and what is missing."""
     states = pieces(results)
     speed = read(results / "speed.csv")
     gpu = [row for row in speed if row["steps_per_s"] != "–"]
@@ -161,10 +68,6 @@ def summary(results: Path) -> None:
     show("speed", gpu, columns.split())
     columns = "scene worlds world_threads kernel_size dispatch_price kernels dispatches build_s steps_per_s"
     show("threads per world, cuts of kernels", read(results / "splits.csv"), columns.split())
-    compared = [row for row in read(results / "predicted.csv") if row["predicted_for"] != UNPREDICTED]
-    far = [row for row in compared if row["beyond"] == "yes"]
-    columns = "scene worlds adapter predicted_for predicted_steps_per_s measured_steps_per_s measured_over_predicted"
-    show(f"of {len(compared)} predictions, off by more than {FACTOR_MAX}", far, columns.split())
     reason = facts(results / "tensors.csv").get("not measured")
     if reason:
         print(f"\ntensors: not measured: {reason}")
@@ -184,12 +87,11 @@ def summary(results: Path) -> None:
 
 
 def main() -> int:
-    """Does what the command line names."""
-    actions = {"predicted": write_predicted, "summary": summary}
-    if len(sys.argv) != 3 or sys.argv[1] not in actions:
+    """Prints the tables of the folder that the command line names."""
+    if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2
-    actions[sys.argv[1]](Path(sys.argv[2]))
+    summary(Path(sys.argv[1]))
     return 0
 
 

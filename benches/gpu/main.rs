@@ -8,7 +8,6 @@ mod build_time;
 mod checks;
 #[path = "../../tests/common/mod.rs"]
 mod common;
-mod dump;
 mod kernel_times;
 mod measure;
 mod pages;
@@ -77,9 +76,6 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
 fn main() -> anyhow::Result<()> {
     sim_daemon::environment::complete();
     let arguments = Arguments::parse();
-    if let Some(folder) = &arguments.dump {
-        return dump::dump(&arguments, folder);
-    }
     let info = chosen(arguments.adapter.as_deref())?;
     if let Some(folder) = &arguments.build_in {
         return build_time::build_and_print(&arguments, &info, folder);

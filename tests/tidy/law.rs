@@ -179,7 +179,6 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "worlds",
             "frame",
             "create",
-            "offline",
         ],
     ),
     (

@@ -40,8 +40,8 @@ pub enum Device {
     },
 }
 
-/// Least worlds for which [`Device::Auto`] measures. The ends of a frame alone take a card some 120 µs (predicted, `ends_us` in
-/// benches/results/gpu_offline/predictions.csv); in this time eight cores step 150 arms through a frame (benches/NOTES.md).
+/// Least worlds for which [`Device::Auto`] measures. The ends of a frame alone take a card some 120 µs, a prediction; in this
+/// time eight cores step 200 arms through a frame (benches/NOTES.md).
 pub const AUTO_WORLDS: usize = 128;
 
 /// Limit per program. On a busy computer lavapipe takes up to 4 s for a program of a grasp, and 12 s for all of them in sequence.

@@ -46,7 +46,6 @@ mod frame;
 mod imported;
 mod merged;
 mod mirror;
-mod offline;
 mod places;
 mod programs;
 mod shared;
@@ -62,4 +61,3 @@ mod workgroups;
 mod worlds;
 
 pub use create::{Cuts, Wanted, create};
-pub use offline::{Offline, OfflineKernel, Target};

@@ -1,1 +1,0 @@
-"""Judges recorded kernels on cards that are not there: translates, compiles, emulates and times them."""
