@@ -38,9 +38,9 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test check check-format format docs pages test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
-  $(addprefix announce-,demo test docs test-rl train bench-env coverage)
+  $(addprefix announce-,demo test test-all docs test-rl train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
 # The tour comes first because it draws within seconds. The wheel is all that is compiled: a program beside it would
@@ -54,13 +54,23 @@ demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp w
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
+# All Rust tests are in both tiers: none takes more than 15 s. Python's sweeps, whole demos and long runs are marked `nightly`.
+define all_tests
+@if cargo nextest --version >/dev/null 2>&1; \
+then set -x; cargo nextest run --release --workspace; \
+else set -x; cargo test --release --workspace --lib --bins --tests; fi
+$(PROGRAMS)
+$(PYTEST) -n 2 --dist loadfile $(1) py-client/tests tests/python
+endef
+
 # Debian packages come first: without root, the request for them appears before minutes of compiling.
-test: announce-test vulkan browser check ## what `check` does, then every Rust and Python test
-	@if cargo nextest --version >/dev/null 2>&1; \
-	then set -x; cargo nextest run --release --workspace; \
-	else set -x; cargo test --release --workspace --lib --bins --tests; fi
-	$(PROGRAMS)
-	$(PYTEST) -n 2 --dist loadfile py-client/tests tests/python
+test: announce-test vulkan browser check ## what `check` does, then the tests of everything that a change can break
+	$(call all_tests,-m "not nightly")
+	@.ci/duration end $@
+
+test-all: announce-test-all vulkan browser check check-systems ## what `test` and `check-systems` do, with the nightly sweeps and long runs
+	$(call all_tests)
+	@.ci/duration end $@
 
 check: check-format wheel $(VENV)/.docs ## formats, lints and types, without tests
 	$(CLIPPY)
@@ -149,7 +159,7 @@ TEST_PORTABLE := cargo test --release $(PORTABLE) $(AS_MACOS)
 test-portable: ## physics, models and inverse kinematics, and the protocol with the module of macOS
 	$(TEST_PORTABLE)
 
-check-systems: ## lints for macOS and Windows, from any system
+check-systems: ## lints for macOS and Windows, from any system; part of `test-all`
 	rustup target add $(OTHERS)
 	for target in $(OTHERS); do \
 	  env -u PYO3_PYTHON cargo clippy --release --target $$target --quiet --workspace --lib --bins -- -D warnings && \
@@ -251,8 +261,11 @@ llvm-cov: | $(PYTHON)
 # What a target will install, printed before it does.
 announce-demo:
 	@.ci/needs demo && .ci/announce demo "demo" ""
+# Minutes on two cores; the second is for a checkout in which nothing is compiled.
 announce-test:
-	@.ci/needs test && .ci/announce test "demo dev docs" "$(VULKAN) $(BROWSER)"
+	@.ci/needs test && .ci/duration begin test 15 15 && .ci/announce test "demo dev docs" "$(VULKAN) $(BROWSER)"
+announce-test-all:
+	@.ci/needs test-all && .ci/duration begin test-all 30 20 && .ci/announce test-all "demo dev docs" "$(VULKAN) $(BROWSER)"
 announce-docs:
 	@.ci/needs docs && .ci/announce docs "demo dev docs" ""
 announce-test-rl:

@@ -10,7 +10,6 @@ import random
 import subprocess
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import pytest
 
 import tightloop as tl
 from processes import started, stems_of
+from tiers import sweep
 from tightloop import _core
 
 SHARED_MEMORY = Path("/dev/shm")
@@ -103,7 +103,7 @@ def attacked(scene_file: Path, name: str, seed: int, attack: Callable[[random.Ra
     return ends
 
 
-@pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.parametrize("seed", sweep(range(SEEDS), daily=4))
 def test_a_cut_file_costs_no_process_and_no_hang(scene_file, unique, seed):
     first, second, daemon = attacked(scene_file, unique(), seed, cut)
     assert daemon == "alive"
@@ -111,11 +111,10 @@ def test_a_cut_file_costs_no_process_and_no_hang(scene_file, unique, seed):
         assert not end.startswith(("signal", "hang", "exception")), (first, second)
 
 
-def test_changed_bytes_hang_nobody(scene_file, unique):
-    ends = [attacked(scene_file, unique(), seed, flip) for seed in range(SEEDS // 2)]
-    for who, outcomes in zip(("client", "next client", "daemon"), zip(*ends, strict=True), strict=True):
-        print(who, dict(Counter(outcomes)))
-    assert not [end for end in ends if "hang" in end or "exception" in end]
+@pytest.mark.parametrize("seed", sweep(range(SEEDS // 2), daily=1))
+def test_changed_bytes_hang_nobody(scene_file, unique, seed):
+    ends = attacked(scene_file, unique(), seed, flip)
+    assert "hang" not in ends and "exception" not in ends
 
 
 #: Fills shared memory but for some pages, and lets clients join.

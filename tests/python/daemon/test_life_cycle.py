@@ -15,9 +15,10 @@ import pytest
 
 import tightloop as tl
 from processes import alive, left_of, stems_of, stopped, wait_until
+from tiers import nightly
 
 # Kills each way
-KILLS = int(os.environ.get("TIGHTLOOP_KILLS", "50"))
+KILLS = pytest.mark.parametrize("kills", [10, nightly(int(os.environ.get("TIGHTLOOP_KILLS", "50")))])
 
 CALLER = """
 import os, signal, sys, time
@@ -74,9 +75,10 @@ def test_nothing_is_left_however_the_caller_ends(pendulum_urdf, root, end):
         assert process.returncode == 0, errors
 
 
-def test_kill_9_of_the_caller_at_any_moment_leaves_nothing(pendulum_urdf, root):
+@KILLS
+def test_kill_9_of_the_caller_at_any_moment_leaves_nothing(pendulum_urdf, root, kills):
     loop = "while True: sim.step(); sim.reset()"
-    for kill in range(KILLS):
+    for kill in range(kills):
         process = caller(pendulum_urdf, loop)
         pid = daemon_of(process)
         stems = stems_of(pid)
@@ -88,17 +90,19 @@ def test_kill_9_of_the_caller_at_any_moment_leaves_nothing(pendulum_urdf, root):
         assert not list(root.iterdir())
 
 
-def test_kill_9_of_the_caller_while_it_starts_a_daemon_leaves_nothing(pendulum_urdf, root):
-    for kill in range(KILLS):
+@KILLS
+def test_kill_9_of_the_caller_while_it_starts_a_daemon_leaves_nothing(pendulum_urdf, root, kills):
+    for kill in range(kills):
         process = caller(pendulum_urdf, "time.sleep(9)")
-        time.sleep(0.1 + 0.4 * kill / KILLS)
+        time.sleep(0.1 + 0.4 * kill / kills)
         process.kill()
         process.communicate()
         assert wait_until(lambda: not list(root.iterdir()), 2.0), list(root.iterdir())
 
 
-def test_kill_9_of_the_daemon_at_any_moment_is_reported_within_a_second(pendulum, root):
-    for kill in range(KILLS):
+@KILLS
+def test_kill_9_of_the_daemon_at_any_moment_is_reported_within_a_second(pendulum, root, kills):
+    for kill in range(kills):
         with tl.launch(pendulum, worlds=64) as sim:
             stems = stems_of(sim.pid)
             killer = threading.Timer(0.003 * kill % 0.05, os.kill, (sim.pid, signal.SIGKILL))

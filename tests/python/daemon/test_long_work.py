@@ -17,6 +17,7 @@ import pytest
 import tightloop as tl
 from conftest import URDF
 from processes import alive, started, wait_until
+from tiers import sweep
 
 # From a request to the end of the daemon, whatever it does [s]
 END_MAX = 2.0
@@ -157,9 +158,12 @@ REQUESTS: dict[str, tuple[float, Callable[[str, int, int], object]]] = {
 # all signals go one way, so one state stands for the rarer ones
 RARE = ("SIGINT", "SIGHUP")
 CASES = [(work, request) for work in WORK for request in REQUESTS if request not in RARE or work == "a step"]
+# each request at one work, and each work with the request that all services get
+DAILY = [(work, request) for work, request in CASES if request == "SIGTERM" or work == "a step"]
+OTHERS = [case for case in CASES if case not in DAILY]
 
 
-@pytest.mark.parametrize(("work", "request_"), CASES)
+@pytest.mark.parametrize(("work", "request_"), sweep(DAILY + OTHERS, daily=len(DAILY)))
 def test_a_daemon_at_long_work_ends_when_asked_and_leaves_nothing(root, unique, work, request_):
     name = unique()
     beside, ask = REQUESTS[request_]

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from conftest import REPOSITORY
+from tiers import NIGHTLY
 
 EXAMPLES = REPOSITORY / "examples"
 # How each is run here; {out} is an empty folder. What is said must match.
@@ -106,6 +107,7 @@ def test_every_example_has_a_test():
     assert [path.name for path in EXAMPLES.glob("*.rs")] == ["franka_lesson.rs"]
 
 
+@NIGHTLY
 def test_the_twin_in_rust_runs():
     # the Rust tests have built it; this makes sure that it is of this checkout
     build = ["cargo", "build", "--release", "--quiet", "--workspace", "--example", "franka_lesson"]

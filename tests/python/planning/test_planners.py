@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from conftest import REPOSITORY
+from tiers import nightly
 
 
 def run(*arguments: str) -> str:
@@ -24,8 +25,9 @@ def run(*arguments: str) -> str:
         ("cartpole", "sampling", 1),
         ("cartpole", "ilqr", 1),
         ("cartpole", "none", 0),
-        ("arm", "sampling", 1),
         ("arm", "none", 0),
+        # `test_examples.py` runs the same program
+        nightly("arm", "sampling", 1),
     ],
 )
 def test_a_planner_succeeds_and_no_planner_does_not(problem, planner, succeed):

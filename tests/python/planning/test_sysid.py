@@ -9,12 +9,14 @@ import pytest
 
 import tightloop as tl
 from conftest import REPOSITORY
+from tiers import NIGHTLY
 
 sys.path.insert(0, str(REPOSITORY / "examples"))
 import sysid
 
 
 @pytest.mark.filterwarnings("ignore:.*which no body has")
+@NIGHTLY
 def test_found_parameters_predict_another_motion_as_well_as_noise_allows(tmp_path):
     scene, rng = sysid.scene(tmp_path), np.random.default_rng(7)
     with tl.launch(scene, worlds=sysid.Model.worlds, precision="f64", params=sysid.PARAMS, fields=("joint_q",)) as sim:

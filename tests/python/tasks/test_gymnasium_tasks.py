@@ -20,6 +20,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
+from tiers import sweep
 from tightloop.env import VectorEnv
 from tightloop.env.registry import GYMNASIUM_TASKS, make_task
 from tightloop.errors import ArgumentError, CommandRefused, MissingLibrary, SignatureError
@@ -304,7 +305,7 @@ def test_episodes_start_as_gymnasiums(name: str) -> None:
         assert np.abs(shares[0] - shares[1]).max() < most, f"column {column}"
 
 
-@pytest.mark.parametrize("name", ["Humanoid-v5", "HumanoidStandup-v5"])
+@pytest.mark.parametrize("name", sweep(["Humanoid-v5", "HumanoidStandup-v5"], daily=1))
 def test_models_with_another_solver_have_the_same_distributions(name: str) -> None:
     """MuJoCo's PGS stops early, and Newton's method finds the minimum: random episodes are alike, not the same."""
     steps, episodes = 60, 100

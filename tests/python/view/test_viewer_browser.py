@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 import tightloop as tl
 from browser import WIDE, WIDTH, View, chromium, differing, spots
 from processes import started, wait_until
+from tiers import sweep
 from tightloop import Frame
 from tightloop.view import Picture
 from tightloop.view.parts import parts
@@ -106,7 +107,7 @@ def test_two_poses_of_an_arm_are_two_pictures_and_the_first_comes_back(arm, look
         assert differing(view.still(), first) == 0
 
 
-@pytest.mark.parametrize("preset", ["three-quarter", "front"])
+@pytest.mark.parametrize("preset", sweep(["three-quarter", "front"], daily=1))
 def test_page_and_film_have_one_ground_one_background_and_one_light(arm, look, unique, preset):
     with tl.launch(arm, worlds=1, name=unique()) as sim:
         frame = sim.reset()
@@ -186,7 +187,7 @@ def test_256_worlds_are_seen_and_a_frozen_one_is_red(box, look, unique):
         view.wait(lambda: len(spots(is_red(view.shot()))) == 1, "one is left")
 
 
-@pytest.mark.parametrize("worlds", [1, 16])
+@pytest.mark.parametrize("worlds", sweep([16, 1], daily=1))
 def test_the_worlds_fill_what_the_panel_leaves_free(box, look, unique, worlds):
     with tl.launch(box, worlds=worlds, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
         sim.step(body_f=np.full((worlds, len(sim.body_names), 6), np.nan))
@@ -293,7 +294,7 @@ def test_a_page_says_that_the_program_that_opened_it_closed_the_run(box, look, u
     view.errors.clear()  # the browser tries to reach the viewer again
 
 
-@pytest.mark.parametrize("worlds", [1, 2])
+@pytest.mark.parametrize("worlds", sweep([2, 1], daily=1))
 def test_the_camera_moves_with_robots_that_leave_the_picture(box, look, unique, worlds):
     with tl.launch(box, worlds=worlds, name=unique(), on_nan="freeze", params=("body_f",)) as sim:
         sim.reset()

@@ -13,8 +13,10 @@ import pytest
 from live_model import Array, States, live, relative
 
 import tightloop as tl
+from tiers import nightly
 
-STATES = 10_000
+# In the daily tier, and in the nightly one
+STATES = [1_000, nightly(10_000)]
 # Of points and distances [m]
 SAME = 1e-10
 # Normals are differences of points over their length [–]
@@ -146,18 +148,19 @@ def assert_mujocos(
     return counts
 
 
+@pytest.mark.parametrize("states", STATES)
 @pytest.mark.parametrize("name", CAPSULE_BOXES | PAIRS)
-def test_points_and_accelerations_are_mujocos(name):
+def test_points_and_accelerations_are_mujocos(name, states):
     free, still, margin = (CAPSULE_BOXES | PAIRS)[name]
     rng = np.random.default_rng(list(CAPSULE_BOXES | PAIRS).index(name))
-    qpos = random_poses(rng, free, still, STATES)
-    with live(pair_model(free, still, margin), worlds=STATES, fields=FIELDS) as pair:
+    qpos = random_poses(rng, free, still, states)
+    with live(pair_model(free, still, margin), worlds=states, fields=FIELDS) as pair:
         frame = pair.place(at_rest(pair.model, qpos))
         counts = assert_mujocos(pair.model, frame, frame.qpos.astype(float))
     most = {"box": 2, "plane": 2}.get(still[0], 1) if free[0] == "capsule" else 1
     # small spheres start within the margin
     assert min(counts) == (1 if name in ("sphere and cube", "sphere and plane") else 0)
-    assert sum(count >= most for count in counts) > STATES // 20
+    assert sum(count >= most for count in counts) > states // 20
 
 
 @pytest.mark.parametrize("name", CASES)

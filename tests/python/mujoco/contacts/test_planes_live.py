@@ -12,6 +12,8 @@ from live_model import Array, live, relative
 from numpy.random import Generator
 from test_closed_forms import FIELDS, SAME_QACC, assert_mujocos, at_rest
 
+from tiers import sweep
+
 # Of each size or mesh, margin and plane
 WORLDS = 4_000
 PLANES = {"level": "", "tilted": 'quat=".9 .3 -.2 .1" pos=".1 -.2 .3"'}
@@ -99,7 +101,7 @@ def apart(one: Array, other: Array) -> bool:
 
 @pytest.mark.parametrize("plane", PLANES)
 @pytest.mark.parametrize("margin", [0.0, 0.02])
-@pytest.mark.parametrize("size", ["0.08 0.05", "0.02 0.2", "0.3 0.01"])
+@pytest.mark.parametrize("size", sweep(["0.08 0.05", "0.02 0.2", "0.3 0.01"], daily=1))
 def test_points_of_a_cylinder_on_a_plane_are_mujocos(size, margin, plane):
     rng = np.random.default_rng([6, len(size), int(100 * margin)])
     geom = f'type="cylinder" size="{size}"'
@@ -151,6 +153,8 @@ MESHES = {
     "ball of 60": ball(3, 60),
     "ball of 500": ball(4, 500),
 }
+# One with flat faces, one with many corners in a face, one without faces
+DAILY = ("cube", "prism of 16", "ball of 60")
 
 
 def mesh_model(points: Array, margin: float, plane: str = "level") -> mujoco.MjModel:
@@ -161,7 +165,7 @@ def mesh_model(points: Array, margin: float, plane: str = "level") -> mujoco.MjM
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.02])
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", sweep(sorted(MESHES, key=lambda name: name not in DAILY), daily=len(DAILY)))
 def test_points_of_a_mesh_on_a_plane_are_mujocos(name, margin):
     rng = np.random.default_rng([8, list(MESHES).index(name), int(100 * margin)])
     model = mesh_model(MESHES[name], margin, "level" if margin else "tilted")

@@ -11,6 +11,8 @@ import pytest
 from live_model import Live, has_closed_form, live, relative
 from random_mjcf import ACTUATED, EVERYTHING, JOINTS, MEDIUM, random_mjcf
 
+from tiers import sweep
+
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48")) // 8
 FEATURES = {
     "joints": JOINTS,
@@ -77,7 +79,7 @@ def assert_step(case: Live, seed: int, tolerance: float) -> None:
 
 
 @pytest.mark.parametrize("feature", FEATURES)
-@pytest.mark.parametrize("seed", range(TREES))
+@pytest.mark.parametrize("seed", sweep(range(TREES), daily=3))
 def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
     xml = random_mjcf(seed, 1 + seed % 6, FEATURES[feature])
     with live(xml, fields=("actuator_force",)) as case:
@@ -85,7 +87,7 @@ def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
-@pytest.mark.parametrize("seed", range(TREES))
+@pytest.mark.parametrize("seed", sweep(range(TREES), daily=2))
 def test_runs_are_mujocos(integrator: str, seed: int) -> None:
     """200 steps under random controls, until MuJoCo disagrees with a run of its own that begins 1e-13 away."""
     medium = "" if integrator == "RK4" else MEDIUM
@@ -167,7 +169,7 @@ def test_single_precision_is_near(seed: int) -> None:
             assert relative(frame.qacc[world], data.qacc) < 1e-3
 
 
-@pytest.mark.parametrize("seed", range(TREES))
+@pytest.mark.parametrize("seed", sweep(range(TREES), daily=2))
 def test_a_gpu_and_lanes_step_as_one_world(seed: int) -> None:
     """Recorded programs on lavapipe and worlds in SIMD lanes, beside f64."""
     xml = random_mjcf(seed, 1 + seed % 6, EVERYTHING)
