@@ -13,6 +13,7 @@ from random_robots import Coordinates
 
 import tightloop as tl
 from conftest import START
+from tiers import NIGHTLY
 
 WORLDS, FRAMES, SUBSTEPS = 4096, 180, 8
 # Worlds of MuJoCo's, which are the first of ours
@@ -28,6 +29,7 @@ def torque(frame: int) -> Array:
     return 35.0 * np.sin(2 * np.pi * frame / FRAMES) * (np.arange(9) == 2)
 
 
+@NIGHTLY
 def test_it_sinks_in_no_deeper_than_mujocos_and_gains_no_more_energy():
     contact_scene, compiled = lesson(driven=False)
     model = compiled()

@@ -145,7 +145,7 @@ def static_bodies(model: mujoco.MjModel) -> list[int]:
 
 @pytest.mark.parametrize("pairs", [False, True])
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
-@pytest.mark.parametrize("seed", range(2 * TREES))
+@pytest.mark.parametrize("seed", sweep(range(2 * TREES), daily=4))
 def test_geoms_touch_as_mujocos(cone: str, pairs: bool, seed: int) -> None:
     option = f'cone="{cone}" impratio="2"'
     features = replace(JOINTS, geoms=True, pairs=pairs, equalities=seed % 2 == 0, mocap=seed % 3 == 0, option=option)

@@ -17,13 +17,15 @@ from numpy.random import Generator
 from random_robots import KINDS, SCALARS, Coordinates, Tree, mujoco_model_of, random_tree
 
 import tightloop as tl
+from tiers import sweep
 
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48"))
 STEPS = 200
 # Every size up to 40 within 40 seeds, and a few beyond
 SIZES = [1 + 17 * seed % 40 for seed in range(TREES)]
 LARGE = [41, 52, 58, 64]
-SCENES = pytest.mark.parametrize(("seed", "dofs"), list(enumerate(SIZES + LARGE)))
+*OTHERS, LARGEST = enumerate(SIZES + LARGE)
+SCENES = pytest.mark.parametrize(("seed", "dofs"), sweep([LARGEST, *OTHERS], daily=12))
 
 
 def random_scene(folder: Path, seed: int, dofs: int) -> tuple[tl.Scene, dict[str, Tree], Generator]:

@@ -25,13 +25,16 @@ from mujoco_model import Evaluation
 from random_trees import PLAIN, Features, random_urdf
 
 import tightloop as tl
+from tiers import sweep
 
 TREES = int(os.environ.get("TIGHTLOOP_LIVE_TREES", "48"))
+# A tree of each number of dofs
+DAILY = 12
 WORLDS = 16
 EVERYTHING = Features(limits=True, friction=True, damping=True, effort=True, mimics=2)
 
 
-@pytest.fixture(scope="module", params=range(TREES))
+@pytest.fixture(scope="module", params=sweep(range(TREES), daily=DAILY))
 def tree(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Case]:
     """A tree that only gravity and random torques move; every third has armatures."""
     seed, dofs = request.param, 1 + request.param % 12
@@ -81,7 +84,7 @@ def test_two_hundred_steps_follow_mujoco(tree):
 
 
 @pytest.mark.parametrize("features", [PLAIN, EVERYTHING], ids=["plain", "everything"])
-@pytest.mark.parametrize("seed", range(TREES))
+@pytest.mark.parametrize("seed", sweep(range(TREES), daily=DAILY))
 def test_single_precision_agrees_to_its_rounding(tmp_path, seed, features):
     dofs = 1 + seed % 12
     scene = scene_of(tmp_path, random_urdf(seed, dofs, features))
