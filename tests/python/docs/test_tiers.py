@@ -60,7 +60,7 @@ def test_a_sweep_has_its_first_cases_in_both_tiers():
         sweep(range(2), daily=0)
 
 
-def test_workflows_run_the_daily_tier_on_a_push_and_both_at_night():
+def test_workflows_run_the_daily_tier_on_a_push_and_both_at_night_and_for_a_release():
     def targets(workflow: str) -> list[str]:
         text = (REPOSITORY / f".github/workflows/{workflow}.yml").read_text()
         (found,) = re.findall(r"target: \[(.+)\]", text)
@@ -68,6 +68,7 @@ def test_workflows_run_the_daily_tier_on_a_push_and_both_at_night():
 
     assert "test" in targets("fast") and "check-systems" not in targets("fast")
     assert "test-all" in targets("nightly") and "test" not in targets("nightly")
+    assert "- run: make test-all\n" in (REPOSITORY / ".github/workflows/release.yml").read_text()
 
 
 def test_a_target_says_at_its_start_how_long_it_takes(tmp_path: Path):
