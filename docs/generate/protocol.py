@@ -7,7 +7,7 @@ import re
 from generate import rust
 from generate.tables import table
 
-HEADERS = "sim-daemon/protocol/src/header.rs"
+HEADERS = "sim-daemon/protocol/src/wire/header.rs"
 STRUCTS = (
     ("Header of a command", HEADERS, "CommandHeader"),
     ("Operations of a command", HEADERS, "Op"),
@@ -15,11 +15,11 @@ STRUCTS = (
     ("Reasons for a refusal", HEADERS, "RefusalKind"),
     ("Row of a field table", HEADERS, "Row"),
     ("Types of entries", HEADERS, "Dtype"),
-    ("Header of a journal entry", "sim-daemon/protocol/src/journal_header.rs", "JournalHeader"),
+    ("Header of a journal entry", "sim-daemon/protocol/src/wire/journal_header.rs", "JournalHeader"),
 )
 
 
-CONTROL = "sim-daemon/protocol/src/control.rs"
+CONTROL = "sim-daemon/protocol/src/wire/control.rs"
 MESSAGES = (("Requests", "Request"), ("Responses", "Response"))
 
 

@@ -7,7 +7,7 @@ const LONGEST: usize = 400;
 /// Most lines of code of a file below.
 const LONGEST_OLDER: usize = 460;
 /// Files that were longer when lines of code were first counted. None joins them, and one that is short enough leaves.
-const OLDER: [&str; 15] = [
+const OLDER: [&str; 14] = [
     "py-client/src/advice.rs",
     "sim-core/model/src/compile/bodies.rs",
     "sim-core/model/tests/geometry/hulls.rs",
@@ -22,7 +22,6 @@ const OLDER: [&str; 15] = [
     "tests/interventions.rs",
     "tests/params.rs",
     "tests/snapshot.rs",
-    "tests/tidy/law.rs",
 ];
 
 /// Lines of code of a Rust file: those that are neither blank nor a comment alone.

@@ -2,8 +2,10 @@
 
 mod law;
 mod length;
+mod order;
 
-use law::{DOORS, ORDER, UNSAFE};
+use law::{DOORS, UNSAFE};
+use order::ORDER;
 use sim_physics::arrays::Field;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sim_system::files::free_bytes;
 use sim_system::{open_files, process};
 
-use crate::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
+use crate::memory::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].
 #[derive(Debug, thiserror::Error)]

@@ -21,77 +21,45 @@
 //!   lock-step with its own controller; the daemon's own name then only says how many there are.
 //! - A daemon's presence is a lock on `ROOT/NAME.lock` ([`paths`], [`daemon_lock`]); its run is a random `session`.
 //! - Clients know no physics: the [`Description`] names what can be sent and what frames carry.
-//! - Shared memory lies in files of the daemon's folder, which are complete before they have a name (`storage.rs`); a file
-//!   that somebody cuts costs a client or a frame (`mapping.rs`).
+//! - Shared memory lies in files of the daemon's folder, which are complete before they have a name (`memory/storage.rs`); a file
+//!   that somebody cuts costs a client or a frame (`memory/mapping.rs`).
 //! - Every process here belongs to one user. A hostile process of that user is outside what shared memory can stop; against
 //!   mistakes, the daemon copies a command once and checks the copy, and the client checks each table before reading by it.
 //!
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
-mod affinity;
-mod attached;
 mod client;
-mod clock;
-mod command;
-mod connection;
-mod control;
-mod controller;
-pub mod daemon_lock;
-mod described;
-mod description;
-pub mod descriptors;
-pub mod device_memory;
-pub mod digest;
-mod discovery;
 mod error;
-mod forked;
-mod frame;
-mod guard;
-pub mod hash;
-pub mod header;
-mod heartbeat;
-mod hook;
 pub mod host;
 pub mod journal;
-mod journal_header;
-mod liveness;
-mod loaned;
-mod mapping;
+mod lease;
 mod memory;
-mod observer;
-mod on_device;
-mod park;
-pub mod paths;
-mod port;
-mod problem;
-mod reentrant;
-mod service;
-mod stop;
-mod storage;
-pub mod table;
-mod timing;
+mod presence;
 mod transport;
-mod turn;
-mod waiter;
+mod waiting;
+mod wire;
 
 pub use client::Client;
-pub use command::{Command, OnDevice, Values};
-pub use daemon_lock::{cleanup_after_death, sweep};
-pub use description::{
+pub use error::ProtocolError;
+pub use journal::{Entry as JournalEntry, Journal, digest};
+pub use lease::device_memory::{self, Delivery, Descriptor, DeviceCommand, DeviceMemory};
+pub use memory::descriptors;
+pub use memory::forked::Maker;
+pub use memory::frame::{Entry, Frame, View};
+pub use presence::daemon_lock::{self, cleanup_after_death, sweep};
+pub use presence::discovery::{AttachOptions, find};
+pub use presence::paths::{self, Beacon, running};
+pub use presence::stop::stop;
+pub use waiting::hook::{Hook, keep_waiting};
+pub use wire::command::{Command, OnDevice, Values};
+pub use wire::description::{
     Description, FieldInfo, Follower, InputInfo, KeyframeInfo, Late, Pace, ParamInfo, RobotRange,
 };
-pub use device_memory::{Delivery, Descriptor, DeviceCommand, DeviceMemory};
-pub use discovery::{AttachOptions, find};
-pub use error::ProtocolError;
-pub use forked::Maker;
-pub use frame::{Entry, Frame, View};
-pub use header::{
-    ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind, Row,
+pub use wire::hash;
+pub use wire::header::{
+    self, ALIGNMENT, CommandHeader, Dtype, FrameHeader, Line, Op, PROTOCOL_VERSION, RefusalKind,
+    Row,
 };
-pub use hook::{Hook, keep_waiting};
-pub use journal::{Entry as JournalEntry, Journal};
-pub use journal_header::JournalHeader;
-pub use paths::{Beacon, running};
-pub use stop::stop;
-pub use table::{ROWS_MAX, Table};
-pub use timing::{Percentiles, Timing};
+pub use wire::journal_header::JournalHeader;
+pub use wire::table::{self, ROWS_MAX, Table};
+pub use wire::timing::{Percentiles, Timing};

@@ -5,10 +5,10 @@ use super::lease::Lease;
 use super::state::State;
 use super::worlds::S;
 use crate::ProtocolError;
-use crate::control::Response;
-use crate::guard::guarded;
-use crate::memory;
+use crate::memory::guard::guarded;
 use crate::transport::Asked;
+use crate::transport::budget;
+use crate::wire::control::Response;
 
 /// A lease that has ended, and the next one, for which there may be no room while somebody owns pages of the last.
 #[derive(Default)]
@@ -107,8 +107,8 @@ impl State {
             return None;
         }
         if self.lease.is_none() {
-            let needed = memory::lease_bytes(&self.description, &self.frame);
-            match memory::check(memory::free(), needed, 0, "a lease") {
+            let needed = budget::lease_bytes(&self.description, &self.frame);
+            match budget::check(budget::free(), needed, 0, "a lease") {
                 Err(
                     ProtocolError::SharedMemory { free, needed, .. }
                     | ProtocolError::Memory { free, needed, .. },

@@ -1,6 +1,8 @@
 //! A command at the daemon: copied once, then checked; nothing is read from shared memory twice.
 
-use crate::command::{Call, FROM_WORLD, MASK, ON_DEVICE, OnDevice, PATH, Values, command_bytes};
+use crate::wire::command::{
+    Call, FROM_WORLD, MASK, ON_DEVICE, OnDevice, PATH, Values, command_bytes,
+};
 use crate::{Command, CommandHeader, Description, Dtype, Op, Row, Table};
 
 /// The last command received.

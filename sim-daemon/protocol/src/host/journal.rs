@@ -8,13 +8,13 @@ use iceoryx2::prelude::{Node, PortFactory};
 
 use super::Inbox;
 use super::worlds::S;
-use crate::digest::{digest, digests_of};
-use crate::guard::guarded;
-use crate::journal_header::{ENDED, JournalHeader};
-use crate::loaned;
-use crate::memory;
-use crate::storage;
+use crate::journal::digest::{digest, digests_of};
+use crate::memory::guard::guarded;
+use crate::memory::loaned;
+use crate::memory::storage;
+use crate::transport::budget;
 use crate::transport::{self, ControlService, JournalPublisher, JournalService, journal_slots};
+use crate::wire::journal_header::{ENDED, JournalHeader};
 use crate::{ALIGNMENT, Description, ProtocolError, Row, Table};
 
 /// Recorders that one daemon serves at once.
@@ -68,7 +68,7 @@ impl Journals {
     fn size(description: &Description, frame: &Table, observed: u64) -> (usize, usize) {
         let digests = (digests_of(frame) * size_of::<u32>()).next_multiple_of(ALIGNMENT);
         let observed: usize = rows(frame, observed).map(padded).sum();
-        let slot = crate::command::command_bytes(description) + digests + observed;
+        let slot = crate::wire::command::command_bytes(description) + digests + observed;
         let pieces = (description.state_bytes as usize).div_ceil(slot);
         let depth = (JOURNAL / slot).clamp(*DEPTH.start(), *DEPTH.end());
         (slot, depth.max(pieces + BESIDE_STATE))
@@ -77,7 +77,7 @@ impl Journals {
     /// Shared memory that a journal takes, and memory of our own for a state [bytes].
     pub(super) fn bytes(description: &Description, frame: &Table, observed: u64) -> (usize, u64) {
         let (slot, depth) = Journals::size(description, frame, observed);
-        let shared = memory::journal_bytes(slot, journal_slots(depth));
+        let shared = budget::journal_bytes(slot, journal_slots(depth));
         (shared, description.state_bytes)
     }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::journal::Occasion;
 use super::state::{State, header};
 use super::worlds::Worlds;
-use crate::command::{Command, Values};
+use crate::wire::command::{Command, Values};
 use crate::{CommandHeader, Op};
 
 impl State {

@@ -7,8 +7,8 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::S;
-use crate::mapping::{self, Pages};
-use crate::memory::slot_bytes;
+use crate::memory::mapping::{self, Pages};
+use crate::transport::budget::slot_bytes;
 use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher, Waker};
 use crate::{ProtocolError, Table};
 

@@ -24,7 +24,7 @@ pub use inbox::{Inbox, Numbers};
 pub use lease::FrameMemory;
 pub use worlds::{Next, Worlds};
 
-pub use crate::mapping::Pages;
+pub use crate::memory::mapping::Pages;
 
 use self::handover::Handover;
 use self::journal::Journals;
@@ -33,16 +33,16 @@ use self::observers::Observers;
 use self::pace::Pacer;
 use self::state::{State, header};
 use self::worlds::S;
-use crate::affinity::CoreAffinity;
-use crate::clock;
-use crate::daemon_lock::DaemonLock;
-use crate::described;
-use crate::device_memory::{self, Delivery, Door};
-use crate::guard::guarded;
-use crate::mapping;
-use crate::memory;
+use crate::lease::device_memory::{self, Delivery, Door};
+use crate::memory::guard::guarded;
+use crate::memory::mapping;
+use crate::presence::daemon_lock::DaemonLock;
+use crate::presence::described;
+use crate::transport::budget;
 use crate::transport::{self, Sleeper, handshake};
-use crate::waiter::{Waiter, cores};
+use crate::waiting::affinity::CoreAffinity;
+use crate::waiting::clock;
+use crate::waiting::waiter::{Waiter, cores};
 use crate::{Description, Op, ProtocolError, RefusalKind, Table};
 
 /// While commands come without a pause, control requests are looked at this often.
@@ -152,7 +152,7 @@ impl Host {
 
     /// Shared memory taken so far [bytes].
     pub fn shared_bytes(&self) -> u64 {
-        memory::used(&self.daemon_lock.paths().shared_folder())
+        budget::used(&self.daemon_lock.paths().shared_folder())
     }
 
     /// Something that cleans up after killed clients, to be run now and then on a thread of its own.
@@ -363,10 +363,10 @@ fn check(
         description.worlds * groups,
         description.frames_held
     );
-    let own = physics_bytes.saturating_add(memory::own_bytes(description) as u64);
-    memory::check(
-        memory::free(),
-        memory::all_bytes(description, frame).saturating_mul(groups),
+    let own = physics_bytes.saturating_add(budget::own_bytes(description) as u64);
+    budget::check(
+        budget::free(),
+        budget::all_bytes(description, frame).saturating_mul(groups),
         own.saturating_mul(groups as u64),
         &what,
     )
@@ -374,7 +374,7 @@ fn check(
 
 /// Memory that can still be taken, of the machine or of our control group, whichever has less [bytes].
 pub fn free_memory() -> u64 {
-    memory::free().memory
+    budget::free().memory
 }
 
 /// Random number of a run: two runs must not be taken for each other, nothing more.

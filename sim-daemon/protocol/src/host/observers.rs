@@ -6,10 +6,11 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::{S, Worlds};
-use crate::guard::guarded;
-use crate::memory;
+use crate::memory::guard::guarded;
+use crate::memory::loaned;
+use crate::transport::budget;
 use crate::transport::{self, FramePublisher, FrameService, Waker};
-use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table, loaned};
+use crate::{ALIGNMENT, Description, FrameHeader, ProtocolError, Table};
 
 /// Observers see a frame that comes this long after the one before, so that of 60 a second they see all, early ones too ...
 pub(super) const PERIOD: Duration = Duration::from_millis(15);
@@ -42,7 +43,7 @@ impl Observers {
         description: &Description,
         frame: &Table,
     ) -> Result<Observers, ProtocolError> {
-        let table = memory::watch_table(description, frame);
+        let table = budget::watch_table(description, frame);
         let service = transport::create_watch(node, description.frames_held)?;
         let publisher = transport::frame_publisher(&service, table.total_bytes())?;
         let notifier = transport::notifier(&transport::create_event(node, "watch", &[])?)?;

@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use hdrhistogram::Histogram;
 
-use crate::clock::{self, Alarm};
-use crate::description::{Description, Late, Pace};
-use crate::timing::{Percentiles, Timing};
+use crate::waiting::clock::{self, Alarm};
+use crate::wire::description::{Description, Late, Pace};
+use crate::wire::timing::{Percentiles, Timing};
 
 /// A frame that leaves later than due by this share of the period has missed its deadline.
 const TOLERANCE: u64 = 10;

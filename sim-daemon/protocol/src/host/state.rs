@@ -14,19 +14,19 @@ use super::lease::Lease;
 use super::observers::Observers;
 use super::pace::Pacer;
 use super::worlds::{Next, S, Worlds};
-use crate::affinity::CoreAffinity;
-use crate::clock;
-use crate::control::{Request, Response};
-use crate::described::{self, Damage};
-use crate::device_memory::{Door, Visitor};
-use crate::guard::guarded;
-use crate::loaned;
-use crate::mapping;
-use crate::memory;
-use crate::paths::DaemonPaths;
-use crate::port::Port;
+use crate::lease::device_memory::{Door, Visitor};
+use crate::memory::guard::guarded;
+use crate::memory::loaned;
+use crate::memory::mapping;
+use crate::memory::port::Port;
+use crate::presence::described::{self, Damage};
+use crate::presence::paths::DaemonPaths;
+use crate::transport::budget;
 use crate::transport::{self, ControlService, Responder};
-use crate::waiter::Awaited;
+use crate::waiting::affinity::CoreAffinity;
+use crate::waiting::clock;
+use crate::waiting::waiter::Awaited;
+use crate::wire::control::{Request, Response};
 use crate::{ALIGNMENT, Description, Dtype, FrameHeader, Op, ProtocolError, RefusalKind, Table};
 
 /// A look around that comes later than this was held up by ourselves, and heartbeats with it.
@@ -74,7 +74,7 @@ impl State {
             ));
         }
         let (shared, own) = Journals::bytes(&self.description, &self.frame, observed);
-        match memory::check(memory::free(), shared, own, "the journal of a recorder") {
+        match budget::check(budget::free(), shared, own, "the journal of a recorder") {
             Err(
                 ProtocolError::SharedMemory { free, needed, .. }
                 | ProtocolError::Memory { free, needed, .. },
@@ -247,7 +247,7 @@ impl State {
         let Some(lease) = &mut self.lease else {
             return;
         };
-        let room = memory::slot_bytes(&self.frame) - Table::head_bytes(1);
+        let room = budget::slot_bytes(&self.frame) - Table::head_bytes(1);
         let end = reason.floor_char_boundary(room);
         let reason = &reason.as_bytes()[..end];
         let table = Table::lay_out([("reason".to_owned(), Dtype::U8, vec![reason.len()], 0)]);

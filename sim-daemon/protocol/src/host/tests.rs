@@ -7,12 +7,12 @@ use std::process::Stdio;
 use super::journal::RECORDERS_MAX;
 use super::*;
 use crate::PROTOCOL_VERSION;
-use crate::paths::DaemonPaths;
+use crate::presence::paths::DaemonPaths;
 use crate::transport::CommandPublisher;
 use crate::{AttachOptions, Client, CommandHeader, Dtype, Frame, Hook, Op, keep_waiting};
 use fake::{Fake, STATE};
 
-type Clients = crate::service::AnyThread;
+type Clients = crate::memory::service::AnyThread;
 
 fn count(frame: &Frame) -> u64 {
     frame.field("count").unwrap().as_slice::<u64>().unwrap()[0]
@@ -24,8 +24,8 @@ fn send(publisher: &CommandPublisher<Clients>, header: CommandHeader, payload: &
         .loan_slice_uninit(payload.len().div_ceil(crate::Line::WORDS))
         .unwrap();
     *loan.user_header_mut() = header;
-    crate::loaned::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
-    crate::loaned::send(loan).unwrap();
+    crate::memory::loaned::words(loan.payload_mut())[..payload.len()].copy_from_slice(payload);
+    crate::memory::loaned::send(loan).unwrap();
 }
 
 #[test]
@@ -269,7 +269,7 @@ fn a_journal_tells_what_was_carried_out_and_counts_what_was_lost() {
     let first = table.row("joint_f").unwrap().offset / 4;
     let sent: &[f32] = bytemuck::cast_slice(entry.command());
     assert_eq!(sent[first..first + 6], numbers);
-    let digest = crate::digest::checksum(&2_u64.to_le_bytes()) as u32;
+    let digest = crate::journal::digest::checksum(&2_u64.to_le_bytes()) as u32;
     assert_eq!(entry.digests(), [digest; 2]);
     drop(entry);
     let mut left = 3000;

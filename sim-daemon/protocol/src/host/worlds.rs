@@ -1,7 +1,7 @@
 //! What a host and the daemon's loop ask of each other.
 
 use super::lease::FrameMemory;
-use crate::service::OneThread;
+use crate::memory::service::OneThread;
 
 /// The daemon uses its services from one thread.
 pub(super) type S = OneThread;

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
 use super::super::*;
-use crate::paths::DaemonPaths;
+use crate::presence::paths::DaemonPaths;
 use crate::{AttachOptions, Client, Dtype, InputInfo, keep_waiting};
 
 /// Bytes of the state of the daemon: several entries long.

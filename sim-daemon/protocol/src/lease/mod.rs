@@ -1,0 +1,5 @@
+//! A client's end of a lease: commands and their frames, heartbeats, and device memory.
+
+pub(crate) mod controller;
+pub mod device_memory;
+mod heartbeat;

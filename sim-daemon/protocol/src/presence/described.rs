@@ -1,0 +1,78 @@
+//! What a daemon says of itself in files of its folder: its description, which may be large and which every client reads once, and
+//! that its shared memory is damaged.
+
+use std::io::{Read, Write};
+use std::path::PathBuf;
+
+use sim_system::files::private;
+
+use crate::presence::paths::DaemonPaths;
+use crate::{Description, ProtocolError};
+
+/// Longest description that a client reads [bytes].
+const BYTES_MAX: u64 = 1 << 28;
+
+fn path(paths: &DaemonPaths, session: u64) -> PathBuf {
+    paths
+        .shared_folder()
+        .join(format!("{session:016x}.description"))
+}
+
+/// Writes the description of a run.
+pub(crate) fn write(paths: &DaemonPaths, description: &Description) -> Result<(), ProtocolError> {
+    let text = serde_json::to_vec(description).expect("descriptions are plain data");
+    let file = private()
+        .create_new(true)
+        .open(path(paths, description.session));
+    file.and_then(|mut file| file.write_all(&text))
+        .map_err(|error| ProtocolError::transport("write the description", error))
+}
+
+/// Reads the description of a run.
+pub(crate) fn read(paths: &DaemonPaths, session: u64) -> Result<Description, ProtocolError> {
+    let path = path(paths, session);
+    let failed = |error| ProtocolError::transport("read the description", error);
+    let file = private().open(&path).map_err(failed)?;
+    let mut text = Vec::new();
+    // what is no file has no end
+    if file.metadata().map_err(failed)?.is_file() {
+        file.take(BYTES_MAX)
+            .read_to_end(&mut text)
+            .map_err(failed)?;
+    }
+    serde_json::from_slice(&text).map_err(|_| ProtocolError::Damaged {
+        action: "read the description".to_owned(),
+        path: path.display().to_string(),
+    })
+}
+
+/// What of shared memory another program has changed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Damage {
+    /// That of the daemon.
+    Daemon,
+    /// That of a client, while somebody held this lease.
+    Lease(u64),
+}
+
+fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
+    let name = match damage {
+        Damage::Daemon => format!("{session:016x}.damaged"),
+        Damage::Lease(epoch) => format!("{session:016x}.{epoch}.damaged"),
+    };
+    paths.shared_folder().join(name)
+}
+
+/// Tells clients of a damage.
+pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64, damage: Damage) {
+    // one that cannot be notified finds out, or waits for as long as it does
+    let _ = private()
+        .create(true)
+        .truncate(false)
+        .open(mark(paths, session, damage));
+}
+
+/// Whether the daemon has found a damage. A few microseconds.
+pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64, damage: Damage) -> bool {
+    mark(paths, session, damage).exists()
+}

@@ -1,0 +1,87 @@
+//! Looking for a daemon by its name.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use crate::presence::paths::{Beacon, DaemonPaths, Presence, running};
+use crate::waiting::hook::Hook;
+use crate::{PROTOCOL_VERSION, ProtocolError};
+
+/// How long a lock is waited for whose holder does not say who it is.
+const SILENCE_MAX: Duration = Duration::from_secs(2);
+/// How long a daemon is waited for that still starts, where nobody says how long.
+const START_MAX: Duration = Duration::from_secs(10);
+
+/// How to attach.
+#[derive(Debug, Clone, Default)]
+pub struct AttachOptions {
+    /// Root folder; [`crate::presence::paths::default_root`] when `None`.
+    pub root: Option<PathBuf>,
+    /// How long to wait for a daemon that does not run yet; zero gives one that starts already 10 s.
+    pub wait: Duration,
+}
+
+/// Looks for the daemon, or group, `name`, as [`crate::Client::attach`] does, and returns its beacon.
+///
+/// # Errors
+/// [`ProtocolError::NoDaemon`], [`ProtocolError::ProtocolVersion`], [`ProtocolError::BadName`],
+/// [`ProtocolError::Interrupted`]; [`ProtocolError::Starting`] when the daemon is not ready in time, and
+/// [`ProtocolError::Silent`] when somebody holds the name for too long and does not run.
+pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beacon, ProtocolError> {
+    let paths = DaemonPaths::new(options.root.as_deref(), name)?;
+    let (deadline, mut since, mut seen) = (Instant::now() + options.wait, Instant::now(), None);
+    let beacon = loop {
+        let presence = paths.presence()?;
+        if seen != Some(presence) {
+            (since, seen) = (Instant::now(), Some(presence));
+        }
+        let start_end = match options.wait.is_zero() {
+            true => since + START_MAX,
+            false => deadline,
+        };
+        let silence_max = SILENCE_MAX.max(options.wait);
+        match presence {
+            Presence::Running(beacon) => break beacon,
+            Presence::Starting if Instant::now() >= start_end => {
+                return Err(ProtocolError::Starting {
+                    name: name.to_owned(),
+                    seconds: since.elapsed().as_secs_f64(),
+                });
+            }
+            Presence::Silent if since.elapsed() > silence_max => {
+                return Err(ProtocolError::Silent {
+                    name: name.to_owned(),
+                    path: paths.lock_path(),
+                    seconds: since.elapsed().as_secs(),
+                });
+            }
+            Presence::Absent if Instant::now() >= deadline => {
+                let names = running(Some(paths.root()))?;
+                let running = if names.is_empty() {
+                    "none".to_owned()
+                } else {
+                    names.join(", ")
+                };
+                return Err(ProtocolError::NoDaemon {
+                    name: name.to_owned(),
+                    root: paths.root().into(),
+                    running,
+                });
+            }
+            _ => {}
+        }
+        if hook().is_break() {
+            return Err(ProtocolError::Interrupted);
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    if beacon.protocol != PROTOCOL_VERSION {
+        let (daemon, client) = (beacon.protocol, PROTOCOL_VERSION);
+        return Err(ProtocolError::ProtocolVersion {
+            name: name.to_owned(),
+            daemon,
+            client,
+        });
+    }
+    Ok(beacon)
+}

@@ -1,0 +1,74 @@
+//! Is the daemon that we attached to still there?
+
+use std::fs::File;
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::ProtocolError;
+use crate::presence::paths::{Beacon, DaemonPaths, Presence};
+
+/// The daemon that a client attached to.
+#[derive(Debug, Clone)]
+pub(crate) struct Peer {
+    pub(crate) paths: DaemonPaths,
+    pub(crate) beacon: Beacon,
+    /// Its lock file. A logout may remove the file's name while the daemon lives on, and holds the lock.
+    lock: Arc<File>,
+}
+
+impl Peer {
+    /// Opens the lock file of a daemon that was seen to run.
+    ///
+    /// # Errors
+    /// [`ProtocolError::DaemonLost`] when it ended meanwhile; as [`DaemonPaths::presence`].
+    pub(crate) fn find(paths: DaemonPaths, beacon: Beacon) -> Result<Peer, ProtocolError> {
+        let Some(lock) = paths.open_lock()? else {
+            return Err(lost(&paths, beacon));
+        };
+        let lock = Arc::new(lock);
+        Ok(Peer {
+            paths,
+            beacon,
+            lock,
+        })
+    }
+
+    /// Errors when the daemon ended, was killed, or is another one than it was. A microsecond; opens nothing while it lives.
+    pub(crate) fn check(&self) -> Result<(), ProtocolError> {
+        let restarted = || ProtocolError::DaemonRestarted {
+            name: self.paths.name().to_owned(),
+        };
+        match self.paths.presence_in(&self.lock)? {
+            Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
+            Presence::Running(_) => Err(restarted()),
+            // ours has announced itself: one that is starting, or cleaning up, is another
+            Presence::Absent | Presence::Silent | Presence::Starting => {
+                match self.paths.presence() {
+                    Ok(Presence::Running(_)) => Err(restarted()),
+                    _ => Err(lost(&self.paths, self.beacon)),
+                }
+            }
+        }
+    }
+
+    pub(crate) fn lease_lost(&self) -> ProtocolError {
+        ProtocolError::LeaseLost {
+            name: self.paths.name().to_owned(),
+        }
+    }
+
+    pub(crate) fn timeout(&self, waited: Duration) -> ProtocolError {
+        ProtocolError::Timeout {
+            name: self.paths.name().to_owned(),
+            pid: self.beacon.pid,
+            seconds: waited.as_secs_f64(),
+        }
+    }
+}
+
+fn lost(paths: &DaemonPaths, beacon: Beacon) -> ProtocolError {
+    ProtocolError::DaemonLost {
+        name: paths.name().to_owned(),
+        pid: beacon.pid,
+    }
+}
