@@ -9,7 +9,7 @@ use sim_system::signals;
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
 use crate::terminal::printable;
-use crate::{bench, devices, inspect, list, recording, session, top};
+use crate::{bench, devices, inspect, list, recording, serve, top};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -19,7 +19,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
     };
     signals::survive_full_files();
     let result = match &command {
-        CliCommand::Serve(serve) => session::run(serve),
+        CliCommand::Serve(args) => serve::run(args),
         CliCommand::Inspect(args) => inspect::run(args),
         CliCommand::Bench(args) => bench::run(args),
         CliCommand::Record(args) => recording::record(args),

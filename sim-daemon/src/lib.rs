@@ -4,36 +4,23 @@
 //! [`serve`] is the whole command line as one function, so that a Python wheel can carry it.
 
 mod advice;
-mod arrays;
 mod bench;
 mod cli;
 mod commands;
 pub mod config;
-mod device_memory;
 mod devices;
 pub mod environment;
 mod error;
 mod export;
-mod fault_log;
-mod groups;
-mod ik;
 mod inspect;
-mod janitor;
-mod least_memory;
 mod list;
-mod log;
 pub mod observe;
 mod output;
-mod pace;
 mod printer;
 mod recording;
-mod refusal;
-mod server;
-mod session;
-mod snapshot;
+mod serve;
 mod terminal;
 mod top;
-mod watchdog;
 
 use std::ffi::OsString;
 

@@ -64,7 +64,7 @@ pub const UNSAFE: [&str; 45] = [
     "sim-daemon/protocol/src/memory/reentrant.rs", // a value that a lock abandons
     "sim-daemon/protocol/src/memory/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
-    "sim-daemon/src/server.rs",         // samples that a device writes to
+    "sim-daemon/src/serve/server.rs",   // samples that a device writes to
     "sim-daemon/system/src/unix/faults.rs", // a handler of missing pages
     "sim-daemon/system/src/unix/files.rs", // the descriptor of a listener
     "sim-daemon/system/src/unix/forks.rs", // a handler of forks

@@ -216,7 +216,7 @@ fn crates_know_only_what_they_may() {
             text.contains("sim_physics::arrays") && text.contains("Layout")
         })
         .collect();
-    assert_eq!(both, ["sim-daemon/src/export.rs"]);
+    assert_eq!(both, ["sim-daemon/src/export/mod.rs"]);
 }
 
 #[test]

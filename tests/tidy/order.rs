@@ -293,6 +293,17 @@ pub const ORDER: &[(&str, &[&str])] = &[
         &[
             "terminal",
             "output",
+            "serve",
+            "bench",
+            "commands",
+        ],
+    ),
+    ("sim-daemon/src/export", &["refusal", "snapshot", "arrays"]),
+    (
+        "sim-daemon/src/serve",
+        &[
+            "ik",
+            "device_memory",
             "config",
             "error",
             "printer",
@@ -302,12 +313,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "list",
             "top",
             "inspect",
-            "refusal",
-            "snapshot",
-            "ik",
             "export",
-            "device_memory",
-            "arrays",
             "advice",
             "recording",
             "observe",
@@ -320,7 +326,6 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "pace",
             "least_memory",
             "session",
-            "commands",
         ],
     ),
     (

@@ -12,7 +12,7 @@ use sim_physics::arrays::Field;
 
 use crate::cli::Bench;
 use crate::error::DaemonError;
-use crate::session::read_scene;
+use crate::serve::read_scene;
 use commands::Commands;
 
 /// Rates are medians of so many turns.

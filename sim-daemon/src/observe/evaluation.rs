@@ -5,9 +5,9 @@ use std::path::Path;
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_physics::arrays::Field;
 
-use crate::arrays::Arrays;
 use crate::config;
 use crate::error::DaemonError;
+use crate::export::arrays::Arrays;
 
 /// Worlds of a scene that are set to given states and evaluated, in this process and on one thread.
 pub struct Evaluation {

@@ -3,7 +3,7 @@
 
 mod evaluation;
 
-pub use crate::arrays::{Array, Arrays};
+pub use crate::export::arrays::{Array, Arrays};
 pub use evaluation::Evaluation;
 pub use sim_engine::simulation::Precision;
 pub use sim_physics::arrays::Field;

@@ -13,8 +13,8 @@ use super::entries::{Entries, Entry};
 use super::failure::unreadable;
 use super::records::Record;
 use super::run::{Head, Run};
-use crate::arrays::Arrays;
 use crate::error::DaemonError;
+use crate::export::arrays::Arrays;
 
 /// A recording that is run again, frame after frame, without comparing them.
 pub struct Playback {

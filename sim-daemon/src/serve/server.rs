@@ -9,13 +9,13 @@ use sim_engine::simulation::Simulation;
 use sim_protocol::host::{FrameMemory, Host, Next, Pages, Worlds};
 use sim_protocol::{Op, RefusalKind};
 
-use crate::device_memory;
 use crate::error::DaemonError;
+use crate::export::refusal::{Refusal, refusal};
 use crate::export::{self, Advance};
-use crate::fault_log::FaultLog;
-use crate::ik::Ik;
-use crate::log::Log;
-use crate::refusal::{Refusal, refusal};
+use crate::serve::device_memory;
+use crate::serve::fault_log::FaultLog;
+use crate::serve::ik::Ik;
+use crate::serve::log::Log;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! A daemon whose device is lost: it reports why, refuses commands, and ends when it is asked to.
 
-#[path = "../../../sim-core/device/tests/device/layer.rs"]
+#[path = "../../../../sim-core/device/tests/device/layer.rs"]
 mod layer;
 
 use std::path::{Path, PathBuf};
@@ -21,9 +21,9 @@ use sim_protocol::{AttachOptions, Client, Frame, JournalEntry, ProtocolError, ke
 use crate::cli::{Record, Replay};
 use crate::config;
 use crate::export::{self, RunInfo};
-use crate::log::Log;
 use crate::printer::Printer;
 use crate::recording::{follow, replay};
+use crate::serve::log::Log;
 
 /// Serves worlds of an arm on the first GPU, which is lost after so many runs.
 fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {

@@ -11,8 +11,8 @@ use sim_protocol::host::{Inbox, free_memory};
 use sim_system::files::is_nameless;
 use sim_system::process;
 
+use crate::export::refusal::{Refusal, refusal};
 use crate::output;
-use crate::refusal::{Refusal, refusal};
 
 const MB: u64 = 1 << 20;
 

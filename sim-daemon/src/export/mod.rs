@@ -1,5 +1,9 @@
 //! From a simulation to the protocol and back: its description, its frames, and commands that a client sends.
 
+pub(crate) mod arrays;
+pub(crate) mod refusal;
+pub(crate) mod snapshot;
+
 use sim_engine::backend::sharing::SharedMemory;
 use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
@@ -12,8 +16,7 @@ use sim_protocol::{
     self as protocol, InputInfo, Op, ParamInfo, RefusalKind, RobotRange, Row, Table,
 };
 
-use crate::refusal::{Refusal, refusal};
-use crate::snapshot;
+use crate::export::refusal::{Refusal, refusal};
 
 // a frame can carry all fields, and an observer's the state besides
 const _: () = assert!(Field::ALL.len() < protocol::ROWS_MAX);

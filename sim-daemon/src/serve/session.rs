@@ -21,13 +21,13 @@ use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
-use crate::groups;
-use crate::janitor::Janitor;
-use crate::least_memory::check_least_memory;
-use crate::log::{Log, Streams};
-use crate::pace;
-use crate::server;
-use crate::watchdog::Watchdog;
+use crate::serve::groups;
+use crate::serve::janitor::Janitor;
+use crate::serve::least_memory::check_least_memory;
+use crate::serve::log::{Log, Streams};
+use crate::serve::pace;
+use crate::serve::server;
+use crate::serve::watchdog::Watchdog;
 
 /// Counts above this are mistakes; below it, sizes in bytes do not overflow.
 const COUNT_MAX: u64 = u32::MAX as u64;

@@ -17,8 +17,8 @@ use sim_protocol::RefusalKind;
 use sim_protocol::host::Inbox;
 
 use crate::config::IkTask;
-use crate::refusal::{Refusal, refusal};
-use crate::snapshot;
+use crate::export::refusal::{Refusal, refusal};
+use crate::export::snapshot;
 
 /// What a file asks for, beside its arrays.
 #[derive(Deserialize)]

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use sim_engine::simulation::{Frozen, Simulation};
 
-use crate::log::Log;
+use crate::serve::log::Log;
 
 /// Time between two lines, at least.
 const PERIOD: Duration = Duration::from_secs(1);

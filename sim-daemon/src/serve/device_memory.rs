@@ -8,7 +8,7 @@ use sim_protocol::host::Host;
 use sim_protocol::{Delivery, Op, RefusalKind};
 
 use crate::export;
-use crate::refusal::{Refusal, refusal};
+use crate::export::refusal::{Refusal, refusal};
 
 /// How long a client's card is waited for before control requests are looked at.
 const SLICE: Duration = Duration::from_millis(20);

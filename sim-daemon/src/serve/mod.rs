@@ -1,0 +1,15 @@
+//! `tightloop serve`: a daemon from start to end, its loop, and the threads beside it.
+
+mod device_memory;
+mod fault_log;
+mod groups;
+mod ik;
+mod janitor;
+mod least_memory;
+mod log;
+mod pace;
+mod server;
+mod session;
+mod watchdog;
+
+pub(crate) use session::{read_scene, run};
