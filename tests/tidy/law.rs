@@ -3,7 +3,7 @@
 /// The only door of each heavy package.
 pub const DOORS: [(&str, &str); 23] = [
     ("ash", "sim-core/device/src/vulkan"),
-    ("naga", "sim-core/device/src/module.rs"),
+    ("naga", "sim-core/device/src/shader/module.rs"),
     ("wgpu", "sim-core/device/src"),
     ("urdf_rs", "sim-core/model/src/urdf"),
     ("faer", "sim-core/model/src"),
@@ -31,7 +31,7 @@ pub const DOORS: [(&str, &str); 23] = [
 pub const UNSAFE: [&str; 45] = [
     "py-client/src/frame.rs",                      // NumPy views
     "sim-core/device/src/host_pages.rs",           // imports pages of the host
-    "sim-core/device/src/portable.rs",             // programs without checks at run time
+    "sim-core/device/src/program/portable.rs",     // programs without checks at run time
     "sim-core/device/src/software/exit.rs",        // process exit beside a driver thread
     "sim-core/device/src/vulkan/export.rs",        // the driver's memory for other processes
     "sim-core/device/src/vulkan/memory.rs",        // the driver's memory, and the host's

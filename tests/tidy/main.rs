@@ -248,7 +248,7 @@ fn kept_programs_name_the_naga_that_wrote_them() {
     let version = version.split('"').next().unwrap();
     let writer = format!("\"naga {version}\"");
     assert!(
-        read("sim-core/device/src/cache.rs").contains(&writer),
+        read("sim-core/device/src/shader/cache.rs").contains(&writer),
         "{writer}"
     );
 }

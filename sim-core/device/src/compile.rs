@@ -2,10 +2,10 @@
 
 use crate::device::Device;
 use crate::error::DeviceError;
+use crate::program::workers::within;
 use crate::program::{Program, build, read};
+use crate::shader::source::Source;
 use crate::software;
-use crate::source::Source;
-use crate::workers::within;
 use std::time::Duration;
 
 impl Device {

@@ -1,9 +1,9 @@
 //! An open device, and the errors that it reports.
 
 use crate::adapter::{AdapterInfo, Choice, choose, ready};
-use crate::cache::Cache;
 use crate::error::DeviceError;
 use crate::host_pages::HostPages;
+use crate::shader::cache::Cache;
 use crate::vulkan::{self, Vulkan};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -9,7 +9,7 @@
 //!
 //! # Two routes
 //! On Linux a device is opened and submitted to by wgpu, while memory, pipelines and recorded commands are Vulkan's own (`vulkan`).
-//! Elsewhere, and in tests, everything goes through wgpu (`portable`, `encode`, `staging`). Both routes have the same interface, and
+//! Elsewhere, and in tests, everything goes through wgpu (`program::portable`, `batch::encode`, `memory::staging`). Both routes have the same interface, and
 //! one test suite runs over both, with recorded and with encoded batches.
 //!
 //! # Batches
@@ -46,42 +46,32 @@
 mod adapter;
 mod allocation;
 mod batch;
-mod batch_op;
-mod cache;
 mod compile;
 mod device;
-mod encode;
 mod error;
 mod host_pages;
 mod memory;
-mod module;
-mod portable;
 mod program;
 mod raw_op;
-mod run;
-mod shared;
+mod shader;
 mod software;
-mod source;
-mod spirv;
-mod staging;
 #[cfg_attr(not(target_os = "linux"), path = "vulkan_absent.rs")]
 mod vulkan;
-mod workers;
 
 #[doc(hidden)]
 pub use adapter::open_as_discrete;
 pub use adapter::{AdapterInfo, AdapterKind, Choice, adapters};
+pub use batch::run::lose_after;
 pub use batch::{Batch, BatchBuilder, Replay};
-pub use cache::bound;
 pub use device::Device;
 pub use error::DeviceError;
 pub use host_pages::HostPages;
+pub use memory::shared::{Descriptor, Moment, SharedBuffer, Timeline};
 pub use memory::{Buffer, Read, Staging, Write};
-pub use module::translated;
 pub use program::Program;
-pub use run::lose_after;
-pub use shared::{Descriptor, Moment, SharedBuffer, Timeline};
-pub use software::{leave, leave_at_once};
-pub use source::Source;
 #[doc(hidden)]
-pub use workers::compiling;
+pub use program::workers::compiling;
+pub use shader::cache::bound;
+pub use shader::module::translated;
+pub use shader::source::Source;
+pub use software::{leave, leave_at_once};

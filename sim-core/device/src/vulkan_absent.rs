@@ -6,8 +6,8 @@
 )]
 
 use crate::allocation::Residence;
-use crate::module::Module;
 use crate::raw_op::RawOp;
+use crate::shader::module::Module;
 use std::convert::Infallible;
 use std::time::Duration;
 use thiserror::Error;

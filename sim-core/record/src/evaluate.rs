@@ -1,8 +1,8 @@
 //! Runs a recording on the CPU, one world at a time: the check on the program where there is no GPU.
 
-use super::recording::Recording;
-use super::tree::{Binary, Bounds, Cell, Entry, Op, Operand, Quad, Row, Statement, Unary};
-use super::vectorize::WIDTH;
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Binary, Bounds, Cell, Entry, Op, Operand, Quad, Row, Statement, Unary};
+use crate::passes::vectorize::WIDTH;
 use sim_physics::lane::{Num, Real, Tables};
 use std::collections::HashMap;
 

@@ -26,35 +26,20 @@
 //! variable that is assigned, inside a block, a value from before the block without arithmetic; and one that takes two iterations
 //! to arrive.
 
-mod dead_code;
 mod error;
 mod evaluate;
-mod fold;
-mod handles;
-mod iterations;
-mod known_values;
-mod lanes;
-mod lists;
-mod loop_fusion;
-mod loops;
-mod memory;
+mod ir;
+mod passes;
 mod record;
 mod recorder;
-mod recording;
-mod scalar;
-mod schedule;
 pub mod split;
-mod state;
-mod tree;
-mod uses;
-mod vectorize;
 pub mod wgsl;
 
 pub use error::{MAX_NESTING, Misuse, RecordError};
-pub use handles::{
+pub use ir::recording::{Recording, Statements};
+pub use record::record;
+pub use recorder::Recorder;
+pub use recorder::handles::{
     Recorded, RecordedBlock, RecordedIndex, RecordedList, RecordedLoop, RecordedMask, RecordedRow,
     RecordedVariable,
 };
-pub use record::record;
-pub use recorder::Recorder;
-pub use recording::{Recording, Statements};

@@ -1,11 +1,13 @@
 //! Records physics code.
 
 use crate::error::RecordError;
-use crate::handles::Recorded;
+use crate::ir::recording::Recording;
+use crate::ir::tree::Operand;
+use crate::passes::dead_code;
+use crate::passes::loop_fusion;
 use crate::recorder::Recorder;
-use crate::recording::Recording;
-use crate::tree::Operand;
-use crate::{dead_code, loop_fusion, state};
+use crate::recorder::handles::Recorded;
+use crate::recorder::state;
 use std::panic::Location;
 
 /// Records physics code with so many scalar inputs. What the code returns are the outputs, in order.

@@ -1,6 +1,6 @@
 //! Process exit while a driver compiles.
 
-use crate::workers::compiling;
+use crate::program::workers::compiling;
 use std::io::Write;
 
 // SAFETY: as C declares it: it takes any integer and never returns.

@@ -3,12 +3,12 @@
 //! lavapipe compiles the whole program there, other drivers finish it. The run takes place within the caller's compile limit, so later
 //! runs take their usual time.
 
+use crate::batch::op::Slot;
 use crate::batch::{Batch, Replay};
-use crate::batch_op::Slot;
 use crate::device::Device;
 use crate::error::DeviceError;
 use crate::program::Program;
-use crate::workers::within;
+use crate::program::workers::within;
 use std::time::Duration;
 
 /// Size of the dummy buffer behind every binding; no thread reads it [bytes].

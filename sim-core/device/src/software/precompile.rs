@@ -6,11 +6,11 @@
 use crate::adapter::{AdapterKind, Choice};
 use crate::device::{Device, Inner};
 use crate::error::DeviceError;
-use crate::module::Module;
 use crate::program;
+use crate::program::workers::within;
+use crate::shader::module::Module;
+use crate::shader::source::Source;
 use crate::software::first_run::empty_batch;
-use crate::source::Source;
-use crate::workers::within;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 

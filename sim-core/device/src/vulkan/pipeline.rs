@@ -9,7 +9,7 @@
 //! - A number that becomes an index is 0 where it is not a number (`spirv`).
 
 use super::{Failure, Vulkan};
-use crate::module::Module;
+use crate::shader::module::Module;
 use ash::vk;
 use std::ffi::CString;
 

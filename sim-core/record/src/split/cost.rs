@@ -1,7 +1,7 @@
 //! Cost of statements, as a driver's compiler has it: [`Prices`] of kinds of statements, which [`Cost`] counts.
 
-use crate::recording::Recording;
-use crate::tree::{Op, Statement};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Op, Statement};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul};
 

@@ -3,10 +3,10 @@
 use super::items::{Item, Pieces, uses_of};
 use super::kernel::Kernel;
 use super::plan::Plan;
-use crate::lanes;
-use crate::recording::Recording;
-use crate::tree::{Binary, Op, Operand, Row, Statement, Unary};
-use crate::uses::{Rename, Use, computed};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Binary, Op, Operand, Row, Statement, Unary};
+use crate::ir::uses::{Rename, Use, computed};
+use crate::passes::lanes;
 use crate::wgsl::ProgramOptions;
 use std::collections::{BTreeMap, HashMap, HashSet};
 

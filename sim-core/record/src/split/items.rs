@@ -2,10 +2,10 @@
 
 use super::cost::{self, Cost};
 use super::order::Part;
-use crate::lanes;
-use crate::tree::{Op, Operand, Row, Statement, Unary};
-use crate::uses::{Use, of_op, of_statement};
-use crate::vectorize;
+use crate::ir::tree::{Op, Operand, Row, Statement, Unary};
+use crate::ir::uses::{Use, of_op, of_statement};
+use crate::passes::lanes;
+use crate::passes::vectorize;
 
 /// A loop or a block that is cut inside, so that several pieces lie in it.
 #[derive(Clone, Copy, Debug)]

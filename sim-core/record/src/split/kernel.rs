@@ -1,7 +1,7 @@
 //! A kernel: a part of a recording that reads and writes fields.
 
 use super::cost::{self, Prices};
-use crate::recording::Recording;
+use crate::ir::recording::Recording;
 use crate::wgsl::{ProgramOptions, sequence, wgsl};
 use sim_physics::lane::Tables;
 

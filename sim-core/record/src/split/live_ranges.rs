@@ -3,10 +3,10 @@
 use super::cost::Cost;
 use super::items::{Item, Piece, bases, cost_of, uses_of};
 use super::order::Limits;
-use crate::lanes;
-use crate::recording::Recording;
-use crate::tree::{Operand, Statement};
-use crate::uses::{Use, computed};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Operand, Statement};
+use crate::ir::uses::{Use, computed};
+use crate::passes::lanes;
 use std::ops::Range;
 
 /// Live ranges, in the order of all items.

@@ -20,7 +20,7 @@ pub use cost::Prices;
 pub use kernel::Kernel;
 pub use order::{Limits, Part};
 
-use crate::recording::Recording;
+use crate::ir::recording::Recording;
 use crate::wgsl::ProgramOptions;
 use sim_physics::lane::Tables;
 

@@ -3,8 +3,8 @@
 use super::items::{Item, Piece, Pieces, REGION_FIELDS, Region, cost_of};
 use super::live_ranges::LiveRanges;
 use super::order::{Limits, Part};
-use crate::recording::Recording;
-use crate::tree::{Bounds, Row, Statement};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Bounds, Row, Statement};
 
 pub(super) fn pieces(recording: &Recording, limits: Limits, spare: u32) -> Pieces {
     let mut cutter = Cutter {

@@ -3,9 +3,9 @@
 use super::items::{Item, Piece, Pieces, REGION_FIELDS, bases, is_computed_again, uses_of};
 use super::live_out::{Names, live_out};
 use super::private::private;
-use crate::recording::Recording;
-use crate::tree::{Op, Operand, Statement};
-use crate::uses::{Use, computed, of_op};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Op, Operand, Statement};
+use crate::ir::uses::{Use, computed, of_op};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// What a piece is given and what it changes.

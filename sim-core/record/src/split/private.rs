@@ -5,8 +5,8 @@
 //! value, which nothing reads. The solver's coupled system is of this kind.
 
 use super::items::{Item, Piece};
-use crate::tree::{Op, Operand, Statement};
-use crate::uses::{Use, of_op, of_statement};
+use crate::ir::tree::{Op, Operand, Statement};
+use crate::ir::uses::{Use, of_op, of_statement};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// The variables of each piece that are its own in this sense.

@@ -1,7 +1,7 @@
 //! Moves a stop to the end of its loop: the few statements behind it become a block before it, and need no kernel of their own.
 
-use crate::recording::Recording;
-use crate::tree::{Op, Operand, Statement, Unary};
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Op, Operand, Statement, Unary};
 
 /// Most statements behind a stop that are moved.
 const MOVED_MAX: usize = 40;

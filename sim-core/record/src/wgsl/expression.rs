@@ -1,8 +1,8 @@
 //! Expressions: operations and operands of a recording, in WGSL.
 
-use crate::recording::Recording;
-use crate::tree::{Binary, Cell, Entry, Op, Operand, Quad, Row, Unary};
-use crate::vectorize::WIDTH;
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Binary, Cell, Entry, Op, Operand, Quad, Row, Unary};
+use crate::passes::vectorize::WIDTH;
 use std::collections::HashMap;
 
 /// Names of a vector's components.

@@ -6,10 +6,10 @@
 
 use super::Printer;
 use super::expression::COMPONENTS;
-use crate::recording::Recording;
-use crate::tree::{Operand, Statement};
-use crate::uses::{Use, of_statement};
-use crate::vectorize::WIDTH;
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Operand, Statement};
+use crate::ir::uses::{Use, of_statement};
+use crate::passes::vectorize::WIDTH;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::{self, Write};
 

@@ -33,9 +33,9 @@ macro_rules! line {
 mod expression;
 mod fields;
 
-use crate::recording::Recording;
-use crate::tree::{Bounds, Op, Operand, Statement};
-use crate::vectorize::WIDTH;
+use crate::ir::recording::Recording;
+use crate::ir::tree::{Bounds, Op, Operand, Statement};
+use crate::passes::vectorize::WIDTH;
 use expression::{COMPONENTS, Expressions, index, scratch, vector};
 use fields::{Fields, place_of_field};
 use std::fmt::{self, Write};

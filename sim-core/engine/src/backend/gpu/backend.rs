@@ -2,8 +2,8 @@
 
 use super::compiled::Compiled;
 use super::imported::Imported;
+use super::kernels::places::Places;
 use super::mirror::HostMirror;
-use super::places::Places;
 use super::shared::Shared;
 use super::tile::Tile;
 use super::uploads::{Bounds, Rows};

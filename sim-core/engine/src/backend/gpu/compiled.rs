@@ -1,10 +1,10 @@
 //! The programs of a run, compiled, and the tables of the model.
 
-use super::bookkeeping;
-use super::places::Places;
-use super::programs::{KernelSequence, Programs};
+use super::kernels::bookkeeping;
+use super::kernels::places::Places;
+use super::kernels::programs::{KernelSequence, Programs};
+use super::kernels::workgroups::{self, BOOKKEEPING};
 use super::software::{self, Compaction};
-use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, ProgramInfo};
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
 use sim_physics::constants::Constants;

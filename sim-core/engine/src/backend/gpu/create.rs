@@ -1,18 +1,18 @@
 //! Creates the backend of each group: records and compiles the programs, allocates the tiles, and starts the worlds.
 
 use super::backend::Gpu;
-use super::blocks::with_blocks;
 use super::compiled::{Compiled, OutputSources};
-use super::merged::merged;
+use super::kernels::blocks::with_blocks;
+use super::kernels::merged::merged;
+use super::kernels::places::Places;
+use super::kernels::programs::{How, Programs};
+use super::kernels::show;
+use super::kernels::workgroups;
 use super::mirror::HostMirror;
-use super::places::Places;
-use super::programs::{How, Programs};
-use super::show;
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
 use super::tile::Tile;
 use super::uploads::{Bounds, has_own_memory};
-use super::workgroups;
 use crate::backend::noise::Noise;
 use crate::backend::state::{Shape, finds_contacts, start};
 use crate::backend::{Backend, BackendError, Backends, Faults, Groups};

@@ -1,20 +1,20 @@
 //! The GPU backend: worlds live in device memory, and a control frame is one recorded batch.
 //!
 //! # Programs
-//! The physics code is recorded for the model (`programs`). Where nothing touches, all substeps are one recording; otherwise one
+//! The physics code is recorded for the model (`kernels::programs`). Where nothing touches, all substeps are one recording; otherwise one
 //! substep is, and it is dispatched once per substep. `sim_record::split` partitions a recording into kernels that a driver compiles in
 //! good time. It cuts where few values cross; values that cross go through spare fields. The evaluation of output fields is a second
-//! recording. A few more kernels do the bookkeeping (`bookkeeping`: rows, faults, delays) or write a frame (`show`). They are dispatched
+//! recording. A few more kernels do the bookkeeping (`kernels::bookkeeping`: rows, faults, delays) or write a frame (`kernels::show`). They are dispatched
 //! once a frame: one for each command that waits, two around the substeps, and one or, with fields of contacts, two for the frame.
 //!
 //! # Threads per world
-//! Where contacts can be, hardware has eight threads per world (`workgroups`). They share the rows of contacts, and each keeps columns of
-//! the solver's system (`sim_physics::step::solver`, `spread`). Classes of contacts of the same trees are merged for that (`merged`).
-//! Pairs of shapes are tested by blocks, whose loads a thread waits for together (`blocks`).
+//! Where contacts can be, hardware has eight threads per world (`kernels::workgroups`). They share the rows of contacts, and each keeps columns of
+//! the solver's system (`sim_physics::step::solver`, `spread`). Classes of contacts of the same trees are merged for that (`kernels::merged`).
+//! Pairs of shapes are tested by blocks, whose loads a thread waits for together (`kernels::blocks`).
 //! Kernels without such work have one thread per world. Sums over threads have a fixed order.
 //!
 //! # Memory
-//! Programs read and write *fields* (`places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and
+//! Programs read and write *fields* (`kernels::places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and
 //! commands come first, then what stages leave for each other. Contacts lie likewise in a buffer of their own. A *tile* is as many
 //! worlds as a binding can hold (`tile`).
 //!
@@ -38,26 +38,19 @@
 //! more in the other. Other cards were not measured.
 
 mod backend;
-mod blocks;
-mod bookkeeping;
 mod compiled;
 mod create;
 mod frame;
 mod imported;
-mod merged;
+mod kernels;
 mod mirror;
-mod places;
-mod programs;
 mod shared;
-mod shared_commands;
 mod sharing;
-mod show;
 mod sizing;
 mod software;
 mod tile;
 mod uploads;
 mod words;
-mod workgroups;
 mod worlds;
 
 pub use create::{Cuts, Wanted, create};

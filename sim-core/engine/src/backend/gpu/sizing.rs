@@ -1,9 +1,9 @@
 //! Sizes: worlds of a tile, memory of a tile, and what an adapter cannot hold.
 
-use super::places::Places;
+use super::kernels::places::Places;
+use super::kernels::workgroups::{self, BOOKKEEPING};
 use super::software;
 use super::uploads;
-use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, available_memory};
 use sim_device::{AdapterKind, Device};
 use sim_model::SensedShapes;

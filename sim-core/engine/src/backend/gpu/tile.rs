@@ -15,11 +15,11 @@
 //! | frame, runs, pairs | the layout's, the runs', the pairs' | `check_frame` and `show` derive both from one layout |
 
 use super::compiled::{Compiled, Kernels, constant};
-use super::places::Places;
-use super::show::{Run, ShowTable};
+use super::kernels::places::Places;
+use super::kernels::show::{Run, ShowTable};
+use super::kernels::workgroups::{self, BOOKKEEPING};
 use super::software::{self, ActiveWorlds};
 use super::uploads::{RowUpload, Rows, StagedCommand};
-use super::workgroups::{self, BOOKKEEPING};
 use crate::backend::{BackendError, Input};
 use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
 use sim_physics::constants::Constants;

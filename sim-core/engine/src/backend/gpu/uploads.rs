@@ -5,11 +5,11 @@
 //!
 //! On a card with its own memory, a program that reads host memory waits for the bus. There the words are copied first ([`Upload`]).
 
-#[cfg(doc)]
-use super::bookkeeping;
 use super::compiled::{Compiled, constant};
-use super::places::Places;
-use super::workgroups::BOOKKEEPING;
+#[cfg(doc)]
+use super::kernels::bookkeeping;
+use super::kernels::places::Places;
+use super::kernels::workgroups::BOOKKEEPING;
 use crate::backend::{BackendError, Input};
 use sim_device::{
     AdapterKind, Batch, BatchBuilder, Buffer, Device, DeviceError, Program, Replay, Staging,

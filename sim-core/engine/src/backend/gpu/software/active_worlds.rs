@@ -8,7 +8,7 @@
 //! arrive. It does not affect results.
 
 use crate::backend::BackendError;
-use crate::backend::gpu::workgroups;
+use crate::backend::gpu::kernels::workgroups;
 use sim_device::{BatchBuilder, Buffer, Device, Program, Source};
 use sim_record::split::Part;
 use std::ops::Range;

@@ -1,0 +1,40 @@
+//! Threads per workgroup, and per world. Measured on an H100; other cards were not.
+
+use sim_device::{AdapterInfo, AdapterKind};
+use sim_record::wgsl::Exchange;
+
+/// Threads of a subgroup of most GPUs, and of the software driver's workgroups of physics.
+pub(in crate::backend::gpu) const SUBGROUP: u32 = 32;
+
+/// Bookkeeping and output.
+pub(in crate::backend::gpu) const BOOKKEEPING: u32 = 64;
+
+/// Kernels of physics need many registers: a workgroup is one subgroup, so that none waits for another and no thread of it idles.
+/// A driver that does not tell its subgroups reports at most 128 threads; more than 64 no GPU has.
+pub(in crate::backend::gpu) fn physics(info: &AdapterInfo) -> u32 {
+    match info.kind {
+        AdapterKind::Software => SUBGROUP,
+        _ => info.subgroup_max.clamp(SUBGROUP, BOOKKEEPING),
+    }
+}
+
+/// Threads that share a world where contacts can be: the rows of its contacts, and the columns of its system. With eight, a subgroup of
+/// 32 has four worlds, which wait for the slowest of four instead of 32.
+const WORLD_THREADS: usize = 8;
+
+/// The threads of a world on an adapter. The software driver computes on the CPU, and more threads only add work there.
+pub(in crate::backend::gpu) fn of_world(info: &AdapterInfo) -> usize {
+    match info.kind {
+        AdapterKind::Software => 1,
+        _ if !info.shuffles => 1,
+        _ => WORLD_THREADS,
+    }
+}
+
+/// How the threads of a world exchange values.
+pub(in crate::backend::gpu) fn exchange(info: &AdapterInfo) -> Exchange {
+    match info.shuffles {
+        true => Exchange::Subgroup,
+        false => Exchange::Workgroup,
+    }
+}
