@@ -224,10 +224,7 @@ impl Controller {
         self.seq += 1;
         send(&self.publisher, self.seq);
         self.connection.notify();
-        let sample = self.answer(
-            Op::Step as usize - 1,
-            &mut crate::waiting::hook::keep_waiting(),
-        )?;
+        let sample = self.answer(Op::Step as usize - 1, &mut crate::keep_waiting())?;
         self.open(sample)
     }
 
