@@ -1,6 +1,7 @@
 //! Files are short enough to read: comments, docstrings and blank lines are free.
 
 use crate::{files, read, sources};
+use std::collections::BTreeMap;
 
 /// Most lines of code of a file.
 const LONGEST: usize = 400;
@@ -23,6 +24,9 @@ const OLDER: [&str; 14] = [
     "tests/params.rs",
     "tests/snapshot.rs",
 ];
+
+/// Most files of a folder of Rust modules.
+const FOLDER: usize = 20;
 
 /// Lines of code of a Rust file: those that are neither blank nor a comment alone.
 fn of_rust(text: &str) -> usize {
@@ -95,6 +99,18 @@ fn files_have_at_most_400_lines_of_code() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn folders_of_modules_have_at_most_20_files() {
+    let mut folders = BTreeMap::<String, usize>::new();
+    let modules = files("sim-core/record/src", ".rs");
+    for path in sources().into_iter().chain(modules) {
+        let (folder, _) = path.rsplit_once('/').expect("it is in a folder");
+        *folders.entry(folder.to_owned()).or_default() += 1;
+    }
+    folders.retain(|_, count| *count > FOLDER);
+    assert!(folders.is_empty(), "sort into folders: {folders:#?}");
 }
 
 #[test]
