@@ -34,8 +34,8 @@ WORLDS = 64
 SAMPLES, SAMPLE_SECONDS = 120, 2.5
 # the daemon looks for dead clients every 0.1 s and for files without an owner every 0.5 s, twice; on busy cores later
 SETTLE_SECONDS = 10.0
-# growth that counts as none: allocators and caches breathe, and the daemon has two sockets to each of three guests until
-# it next wakes one
+# growth that counts as none: allocators and caches breathe, and the daemon has two sockets to each of three guests
+# until it next wakes one
 SLACK = {"daemon_kib": 4096, "client_kib": 4096, "daemon_descriptors": 6}
 OBSERVER = """
 import sys, time, tightloop as tl

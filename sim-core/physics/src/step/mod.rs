@@ -16,33 +16,6 @@ pub mod tree;
 use params::{gravity, masses, param};
 pub use stage::{BlockOf, ConstantsOf, Runs, Stage, StageId, StageRow};
 
-use crate::constants::Constants;
-use crate::lane::Real;
-
-/// The stages of a step that a model needs, in order.
-///
-/// A step finds its forces once and moves the state by them. One by Runge-Kutta begins, finds them four times, each time
-/// followed by a part of its move, and takes commands the first time.
-pub fn step_stages<R: Real>(m: &Constants<R>) -> Vec<StageId> {
-    let stages = |runs| -> Vec<StageId> {
-        let of_row = StageId::all().filter(|stage| stage.row().runs == runs);
-        of_row.filter(|stage| stage.is_needed(m)).collect()
-    };
-    let (commands, forces) = (stages(Runs::Once), stages(Runs::Both));
-    match &stages(Runs::RungeKutta)[..] {
-        [] => [commands, forces, stages(Runs::Step)].concat(),
-        [begin, first, others @ ..] => {
-            let mut order = [vec![*begin], commands, forces.clone(), vec![*first]].concat();
-            for part in others {
-                order.extend(&forces);
-                order.push(*part);
-            }
-            order
-        }
-        [_] => unreachable!("its five stages are needed together"),
-    }
-}
-
 /// The stages in the order of a step: name, page, and what [`Runs`] it.
 /// The name is also the symbol of the compiled function, so a profile shows it.
 #[macro_export]
@@ -93,7 +66,7 @@ macro_rules! every_stage {
             solver_turning       [solver::Solver::<true>]                    Both;
             refine               [solver::Refine]                            Both;
             integrate            [integrate::semi_implicit::Integrate]       Step;
-            // in its place: see `step_stages`
+            // in its place, as `schedule::step_stages` orders them
             runge_kutta_0        [integrate::runge_kutta::Begin]             RungeKutta;
             runge_kutta_1        [integrate::runge_kutta::RungeKutta::<0>]   RungeKutta;
             runge_kutta_2        [integrate::runge_kutta::RungeKutta::<1>]   RungeKutta;

@@ -12,8 +12,8 @@ use sim_physics::arrays::{Array, Block, Flat, Layout};
 use sim_physics::compiled::Stages;
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
-use sim_physics::schedule::evaluation_stages;
-use sim_physics::step::{Runs, StageId, step_stages};
+use sim_physics::schedule::{evaluation_stages, step_stages};
+use sim_physics::step::{Runs, StageId};
 use std::ops::Range;
 
 /// Data that all chunks share.
