@@ -24,7 +24,8 @@ mod top;
 
 use std::ffi::OsString;
 
-use sim_physics::arrays::Field;
+use sim_engine::backend::Input;
+use sim_physics::arrays::{Field, Takes};
 use sim_physics::constants::params::Param;
 
 pub use error::DaemonError;
@@ -47,6 +48,60 @@ pub fn keep_meshes() {
 /// Names of all fields that frames may carry.
 pub fn field_names() -> Vec<&'static str> {
     Field::ALL.iter().map(|field| field.row().name).collect()
+}
+
+/// A command, as a client of any scene knows it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CommandRow {
+    /// Its name.
+    pub name: &'static str,
+    /// What its columns are of, such as "dofs".
+    pub axis: String,
+    /// Columns of each entry of that axis.
+    pub parts: usize,
+    /// Unit; "–" for none.
+    pub unit: &'static str,
+    /// What it is.
+    pub doc: &'static str,
+    /// Whether it takes 0 and 1 alone.
+    pub is_switch: bool,
+    /// Whether `write` sets it, too.
+    pub is_written: bool,
+    /// Whether it is a parameter, which acts where the launch names it.
+    pub is_param: bool,
+}
+
+/// Every command of a step, in the order of their table.
+pub fn command_rows() -> Vec<CommandRow> {
+    let rows = Input::commands().map(|input| {
+        let (axis, parts) = input.axis();
+        let (unit, doc) = match input {
+            Input::Field(field) => (field.row().unit, field.row().doc),
+            Input::Param(param) => (param.row().unit, param.row().doc),
+        };
+        CommandRow {
+            name: input.name(),
+            axis: axis.name(),
+            parts,
+            unit,
+            doc,
+            is_switch: input.kept().map(|command| command.takes) == Some(Takes::Switches),
+            is_written: matches!(input, Input::Field(field) if field.is_written()),
+            is_param: matches!(input, Input::Param(_)),
+        }
+    });
+    rows.collect()
+}
+
+/// What the columns of an input are of, such as "dofs", and how many each entry of that axis has; none of an output.
+pub fn input_axis(name: &str) -> Option<(String, usize)> {
+    let input = Input::named(name)?;
+    let is_output = |field: Field| !field.is_written() && field.row().command.is_none();
+    if matches!(input, Input::Field(field) if is_output(field)) {
+        return None;
+    }
+    let (axis, parts) = input.axis();
+    Some((axis.name(), parts))
 }
 
 /// Names of all parameters that may vary between worlds.

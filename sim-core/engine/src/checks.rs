@@ -1,8 +1,8 @@
 //! Checks of arrays that callers give: shape, finite values, quaternions, targets, masks.
 
-use crate::backend::{BackendError, Values};
+use crate::backend::{BackendError, Input, Values};
 use crate::simulation::Simulation;
-use sim_physics::arrays::{Field, Group};
+use sim_physics::arrays::{Field, Group, Takes};
 use sim_physics::constants::Motion;
 use std::ops::Range;
 
@@ -38,14 +38,6 @@ impl Simulation {
         }
         let all = field.elements(&self.model().sizes());
         self.check_shape(row.name, all, columns, values.len())?;
-        let names = match field {
-            Field::JointQ => self.model().coord_names(),
-            Field::Ctrl => self.model().actuator_names(),
-            Field::Act => self.model().activation_names(),
-            Field::MocapPos | Field::MocapQuat => self.model().mocap_names(),
-            Field::EqActive => self.model().equality_names(),
-            _ => self.model().dof_names(),
-        };
         let row_of = |world: usize| world * columns.len()..(world + 1) * columns.len();
         let not_finite = match mask {
             None => values.first_not_finite(0..values.len(), self.precision()),
@@ -55,23 +47,22 @@ impl Simulation {
         };
         let is_kept_out = self.freezes_nan() && group == Group::Command;
         if let Some(place) = not_finite.filter(|_| !is_kept_out) {
+            let (axis, parts) = Input::from(field).axis();
+            let column = columns.start + place % columns.len();
             return Err(BackendError::NotFinite {
                 field: row.name,
                 world: place / columns.len(),
-                // a mocap body has several columns
-                name: names[(columns.start + place % columns.len()) * names.len() / all].clone(),
+                name: self.model().names(axis).swap_remove(column / parts),
                 value: self.precision().round(values.at(place)),
             });
         }
-        match field {
-            Field::JointQ => self.check_quaternions(columns, values, mask)?,
-            Field::JointTargetQ | Field::JointTargetQd => {
-                self.check_targets(field, columns, values)?;
-            }
-            Field::EqActive => self.check_switches(columns, values, mask)?,
-            _ => {}
+        match row.command.map(|command| command.takes) {
+            Some(Takes::Targets) => self.check_targets(field, columns, values),
+            Some(Takes::Switches) => self.check_switches(field, columns, values, mask),
+            Some(Takes::Reals) => Ok(()),
+            None if field == Field::JointQ => self.check_quaternions(columns, values, mask),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Refuses columns outside of `all`, and a wrong number of values.
@@ -135,6 +126,7 @@ impl Simulation {
     /// Refuses values that are neither 0 nor 1.
     fn check_switches(
         &self,
+        field: Field,
         columns: &Range<usize>,
         values: Values<'_>,
         mask: Option<&[bool]>,
@@ -144,9 +136,12 @@ impl Simulation {
                 let value = values.at(world * columns.len() + column - columns.start);
                 if value != 0.0 && value != 1.0 {
                     return Err(BackendError::Switch {
-                        field: Field::EqActive.row().name,
+                        field: field.row().name,
                         world,
-                        name: self.model().equality_names()[column].clone(),
+                        name: {
+                            let (axis, parts) = Input::from(field).axis();
+                            self.model().names(axis).swap_remove(column / parts)
+                        },
                         value,
                     });
                 }

@@ -1,10 +1,9 @@
-//! Commands of a simulation: the fields of [`Group::Command`] and, where the run has it, `body_f`.
+//! Commands of a simulation: those of [`Input::commands`] that the run has.
 //!
 //! [`Simulation::command`] checks the array, writes the worlds whose values are finite, and freezes
 //! the others where the run is set to freeze them. A command holds until it is set again or the world is reset.
 //!
-//! `joint_f` and the joint targets act with the world's command delay and carry noise; the other fields act at once. `body_f` is a
-//! load: a parameter that acts at once.
+//! Those that drives keep act with the world's command delay and carry noise; the others act at once.
 
 use crate::backend::{BackendError, Input, Values};
 use crate::simulation::Simulation;
@@ -93,8 +92,6 @@ impl Simulation {
 }
 
 fn command_names() -> String {
-    let fields = Field::ALL.iter().map(|field| field.row());
-    let commands = fields.filter(|row| row.group == Group::Command);
-    let names: Vec<_> = commands.map(|row| row.name).collect();
+    let names: Vec<_> = Field::commands().map(|field| field.row().name).collect();
     names.join(", ")
 }

@@ -1,6 +1,6 @@
 //! Parameters of a simulation: written and read per world, effective from the next step on.
 
-use crate::backend::{BackendError, Values};
+use crate::backend::{BackendError, Input, Values};
 use crate::simulation::Simulation;
 use sim_physics::constants::params::{Param, Per};
 use std::ops::Range;
@@ -111,16 +111,10 @@ impl Simulation {
 
     /// Name of the joint, body, shape or axis that a column belongs to.
     fn param_name(&self, param: Param, column: usize) -> String {
-        let model = self.model();
-        match param.row().per {
-            Per::Entry(1) => "all its commands".to_owned(),
-            Per::Entry(_) => ["x", "y", "z"][column.min(2)].to_owned(),
-            Per::Dof => model.dof_names()[column].clone(),
-            Per::Body(n) => model.body_names()[column / n].clone(),
-            Per::Shape => model.shape_names()[column].clone(),
-            Per::Site(n) => model.site_names()[column / n].clone(),
-            Per::ContactSensor => model.contact_sensors()[column].name.clone(),
-            Per::Actuator(n) => model.actuator_names()[column / n].clone(),
+        if param.row().per == Per::Entry(1) {
+            return "all its commands".to_owned();
         }
+        let (axis, parts) = Input::from(param).axis();
+        self.model().names(axis).swap_remove(column / parts)
     }
 }

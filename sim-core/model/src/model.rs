@@ -2,6 +2,7 @@
 
 use crate::description::ParamDraw;
 use crate::distribution::Distribution;
+use sim_physics::arrays::Axis;
 use sim_physics::constants::Constants;
 use sim_physics::constants::Sizes;
 use sim_physics::constants::scan::HeightScan;
@@ -124,6 +125,33 @@ impl Model {
     pub fn substeps(&self) -> usize {
         self.substeps
     }
+    /// Names of what an axis has an entry for; of a fixed length, x, y and z or numbers. Nothing where there are no names.
+    pub fn names(&self, axis: Axis) -> Vec<String> {
+        match axis {
+            Axis::Dofs => self.dof_names.clone(),
+            Axis::Coords => self.coord_names.clone(),
+            Axis::Bodies => self.body_names.clone(),
+            Axis::Shapes => self.shape_names.clone(),
+            Axis::Sites => self.site_names.clone(),
+            Axis::ContactSensors => {
+                let sensors = self.contact_sensors.iter();
+                sensors.map(|sensor| sensor.name.clone()).collect()
+            }
+            Axis::Actuators => self.actuator_names.clone(),
+            Axis::Activations => self.activation_names.clone(),
+            Axis::Mocaps => self.mocap_names.clone(),
+            Axis::Equalities => self.equality_names.clone(),
+            Axis::MujocoSites => self.mujoco_site_names.clone(),
+            Axis::Size(3) => ["x", "y", "z"].map(str::to_owned).to_vec(),
+            Axis::Size(n) => (0..n).map(|k| k.to_string()).collect(),
+            Axis::Rows
+            | Axis::Contacts
+            | Axis::ScanRays
+            | Axis::MujocoBodies
+            | Axis::MujocoGeoms
+            | Axis::Sensordata => Vec::new(),
+        }
+    }
     /// Names of the dofs, `robot/joint` or `robot/joint.part`.
     pub fn dof_names(&self) -> &[String] {
         &self.dof_names
@@ -140,10 +168,6 @@ impl Model {
     pub fn shape_names(&self) -> &[String] {
         &self.shape_names
     }
-    /// Names of the actuators that have an activation, in the order of `act`.
-    pub fn activation_names(&self) -> &[String] {
-        &self.activation_names
-    }
     /// Keyframes of the models from MuJoCo.
     pub fn keyframes(&self) -> &[KeyState] {
         &self.keyframes
@@ -151,14 +175,6 @@ impl Model {
     /// Names of the equalities, `robot/equality`, in the order of `eq_active`.
     pub fn equality_names(&self) -> &[String] {
         &self.equality_names
-    }
-    /// Names of the bodies that clients place, `robot/body`, in the order of `mocap_pos`.
-    pub fn mocap_names(&self) -> &[String] {
-        &self.mocap_names
-    }
-    /// Names of the actuators, `robot/actuator`.
-    pub fn actuator_names(&self) -> &[String] {
-        &self.actuator_names
     }
     /// The sensors of MuJoCo models, in MuJoCo's order.
     pub fn sensors(&self) -> &[SensorInfo] {

@@ -8,7 +8,7 @@ use sim_engine::backend::sharing::SharedMemory;
 use sim_engine::backend::{Input, Values};
 use sim_engine::simulation::{Options, Precision, Simulation};
 use sim_model::{Description as Scene, JointKind, KeyState, Model};
-use sim_physics::arrays::{Dtype, Field, FieldDtype, FieldRow, Group, Layout};
+use sim_physics::arrays::{Axis, Dtype, Field, FieldDtype, FieldRow, Layout};
 use sim_physics::constants::Equality;
 use sim_physics::constants::params::Param;
 use sim_protocol::host::{Inbox, Numbers};
@@ -47,6 +47,12 @@ pub(crate) fn frame_table(layout: &Layout) -> Table {
         (name, dtype(slot.dtype), slot.shape.clone(), slot.offset)
     });
     Table::over_arena(slots, layout.bytes)
+}
+
+/// Names of the commands that are 0 in worlds that stop because no command comes.
+pub(crate) fn stops() -> Vec<&'static str> {
+    let stops = |input: &Input| input.kept().is_some_and(|command| command.stops);
+    Input::commands().filter(stops).map(Input::name).collect()
 }
 
 /// Memory of a GPU, as clients import it.
@@ -98,8 +104,7 @@ pub(crate) fn description(
     let sizes = model.sizes();
     let input = |is_one: fn(Field) -> bool| {
         let rows = Field::ALL.iter().filter(move |field| {
-            let of_models = field.is_mujoco_command() || **field == Field::Act;
-            is_one(**field) && (!of_models || field.elements(&sizes) > 0)
+            is_one(**field) && (field.is_of_joints() || field.elements(&sizes) > 0)
         });
         rows.map(|field| InputInfo {
             name: field.row().name.to_owned(),
@@ -127,16 +132,16 @@ pub(crate) fn description(
         dt: model.dt(),
         substeps: model.substeps(),
         gravity: info.scene.gravity,
-        dof_names: model.dof_names().to_vec(),
-        coord_names: model.coord_names().to_vec(),
-        body_names: model.body_names().to_vec(),
-        shape_names: model.shape_names().to_vec(),
-        site_names: model.site_names().to_vec(),
-        actuator_names: model.actuator_names().to_vec(),
-        activation_names: model.activation_names().to_vec(),
-        mocap_names: model.mocap_names().to_vec(),
+        dof_names: model.names(Axis::Dofs),
+        coord_names: model.names(Axis::Coords),
+        body_names: model.names(Axis::Bodies),
+        shape_names: model.names(Axis::Shapes),
+        site_names: model.names(Axis::Sites),
+        actuator_names: model.names(Axis::Actuators),
+        activation_names: model.names(Axis::Activations),
+        mocap_names: model.names(Axis::Mocaps),
         mocap_quat: model.start().mocap_quat.clone(),
-        equality_names: model.equality_names().to_vec(),
+        equality_names: model.names(Axis::Equalities),
         keyframes: model.keyframes().iter().map(keyframe).collect(),
         sensor_names: {
             let sensors = model.sensors().iter();
@@ -146,10 +151,7 @@ pub(crate) fn description(
             let places = model.sensors().iter().map(|sensor| &sensor.place);
             places.map(|place| [place.start, place.end]).collect()
         },
-        contact_sensor_names: {
-            let sensors = model.contact_sensors().iter();
-            sensors.map(|sensor| sensor.name.clone()).collect()
-        },
+        contact_sensor_names: model.names(Axis::ContactSensors),
         robots: model
             .robots()
             .iter()
@@ -193,7 +195,7 @@ pub(crate) fn description(
             })
             .collect(),
         commands: {
-            let mut commands: Vec<InputInfo> = input(|field| field.row().group == Group::Command);
+            let mut commands: Vec<InputInfo> = input(|field| field.row().command.is_some());
             let loads = model.constants().varying.params();
             let loads = loads.filter(|param| param.is_load());
             commands.extend(loads.map(|param| param_info(model, param)));

@@ -87,6 +87,7 @@ fn run_with(
             group.daemon_lock,
             group.announced,
             group.table,
+            &export::stops(),
             Arc::clone(stop),
         )?;
         // again with the memory of the services; what is refused was said above

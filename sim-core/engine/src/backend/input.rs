@@ -3,19 +3,19 @@
 use super::Precision;
 use super::state::array_of;
 use sim_physics::arrays::Array;
-use sim_physics::arrays::{Field, Group};
+use sim_physics::arrays::{Axis, Command, Field, Keeper, Takes};
 use sim_physics::constants::Constants;
-use sim_physics::constants::params::Param;
+use sim_physics::constants::params::{Param, Per};
 use sim_physics::lane::Real;
 use std::ops::Range;
 
 /// An array that a caller sets: part of the state, a command, or a parameter that varies between worlds.
 ///
-/// Commands are the fields of [`Group::Command`] and, where the run has it, `body_f`. `joint_f` and the joint targets act with the
-/// world's command delay, the other fields at once. `body_f` is a load: a parameter that acts at once and that a reset clears.
+/// Commands are the fields that have a [`Command`] in their row and, where the run has them, loads: parameters that act at once and
+/// that a reset clears.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
-    /// A field of the group [`Group::State`] or [`Group::Command`].
+    /// A part of the state, or a command.
     Field(Field),
     /// A parameter.
     Param(Param),
@@ -34,6 +34,13 @@ impl From<Param> for Input {
 }
 
 impl Input {
+    /// Every command: the fields in the order of their table, then the loads.
+    pub fn commands() -> impl Iterator<Item = Input> {
+        let loads = Param::ALL.into_iter().filter(|param| param.is_load());
+        let fields = Field::commands().map(Input::Field);
+        fields.chain(loads.map(Input::Param))
+    }
+
     /// The command of a name.
     pub fn command(name: &str) -> Option<Input> {
         Input::named(name).filter(|input| input.is_command())
@@ -53,11 +60,40 @@ impl Input {
         }
     }
 
-    /// Whether it is a command: it holds until it is set again or the world is reset.
-    pub fn is_command(self) -> bool {
+    /// How it is kept, if it is a command: it holds until it is set again or the world is reset.
+    pub fn kept(self) -> Option<Command> {
         match self {
-            Input::Field(field) => field.row().group == Group::Command,
-            Input::Param(param) => param.is_load(),
+            Input::Field(field) => field.row().command,
+            Input::Param(param) => param.is_load().then_some(Command {
+                keeper: Keeper::State,
+                takes: Takes::Reals,
+                stops: true,
+            }),
+        }
+    }
+
+    /// Whether it is a command.
+    pub fn is_command(self) -> bool {
+        self.kept().is_some()
+    }
+
+    /// What its columns are of, and how many each entry of that axis has.
+    pub fn axis(self) -> (Axis, usize) {
+        match self {
+            Input::Field(field) => match *field.row().shape {
+                [axis, Axis::Size(parts)] => (axis, parts),
+                [axis] => (axis, 1),
+                _ => unreachable!("`{}` is an output", field.row().name),
+            },
+            Input::Param(param) => match param.row().per {
+                Per::Entry(entries) => (Axis::Size(entries), 1),
+                Per::Dof => (Axis::Dofs, 1),
+                Per::Body(parts) => (Axis::Bodies, parts),
+                Per::Shape => (Axis::Shapes, 1),
+                Per::Site(parts) => (Axis::Sites, parts),
+                Per::ContactSensor => (Axis::ContactSensors, 1),
+                Per::Actuator(parts) => (Axis::Actuators, parts),
+            },
         }
     }
 

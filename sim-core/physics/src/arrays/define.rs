@@ -14,7 +14,7 @@ macro_rules! arrays {
      cells {$($c:ident: $cell:ident [$clen:expr] $cwriter:ident $cunit:literal
         $(=> $cpublic:literal $cgroup:ident [$($caxis:expr),*], $cdoc:literal)?;)*}
      values {$($v:ident: $value:ident [$velement:ident; $vlen:expr] $vwriter:ident $vunit:literal
-        $(=> $vpublic:literal $vgroup:ident [$($vaxis:expr),*], $vdoc:literal)?;)*}
+        $(=> $vpublic:literal $vcommand:ident [$($vaxis:expr),*], $vdoc:literal)?;)*}
      work {$($w:ident: $work:ident [$welement:ident; $wlen:expr] $wwriter:ident $wunit:literal
         $(=> $wpublic:literal [$($waxis:expr),*], $wdoc:literal)?;)*}
      outputs {$($made:ident $public:literal $group:ident [$($axis:expr),*] $unit:literal $dtype:expr, $source:expr, $doc:literal;)*}
@@ -133,21 +133,21 @@ macro_rules! arrays {
                 match self {
                     $($(Field::$cell => {
                         const ROW: FieldRow = FieldRow {
-                            field: Field::$cell, name: $cpublic, group: Group::$cgroup, shape: &[$($caxis),*],
+                            field: Field::$cell, name: $cpublic, group: Group::$cgroup, command: None, shape: &[$($caxis),*],
                             unit: $cunit, dtype: FieldDtype::Real, source: Source::Array(Array::$cell), doc: $cdoc,
                         };
                         &ROW
                     })?)*
                     $($(Field::$value => {
                         const ROW: FieldRow = FieldRow {
-                            field: Field::$value, name: $vpublic, group: Group::$vgroup, shape: &[$($vaxis),*],
+                            field: Field::$value, name: $vpublic, group: Group::Command, command: Some($vcommand), shape: &[$($vaxis),*],
                             unit: $vunit, dtype: FieldDtype::Real, source: Source::Array(Array::$value), doc: $vdoc,
                         };
                         &ROW
                     })?)*
                     $($(Field::$work => {
                         const ROW: FieldRow = FieldRow {
-                            field: Field::$work, name: $wpublic, group: Group::Derived, shape: &[$($waxis),*],
+                            field: Field::$work, name: $wpublic, group: Group::Derived, command: None, shape: &[$($waxis),*],
                             unit: $wunit, dtype: FieldDtype::Real, source: Source::Array(Array::$work), doc: $wdoc,
                         };
                         &ROW
@@ -156,7 +156,7 @@ macro_rules! arrays {
                         #[allow(unused_imports)]
                         use Array::*;
                         const ROW: FieldRow = FieldRow {
-                            field: Field::$made, name: $public, group: Group::$group, shape: &[$($axis),*],
+                            field: Field::$made, name: $public, group: Group::$group, command: None, shape: &[$($axis),*],
                             unit: $unit, dtype: $dtype, source: $source, doc: $doc,
                         };
                         &ROW

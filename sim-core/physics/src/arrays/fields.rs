@@ -53,6 +53,37 @@ pub enum Group {
     Counter,
 }
 
+/// How a command is kept, and which values it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Command {
+    /// Who keeps it.
+    pub keeper: Keeper,
+    /// The values that it takes.
+    pub takes: Takes,
+    /// Whether it becomes 0 in worlds that run in real time and stop because no command comes.
+    pub stops: bool,
+}
+
+/// Who keeps a command until the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeper {
+    /// The drives of joints: it acts with the world's delay and noise, and only `step` sets it.
+    Drive,
+    /// The state: it acts at once, and `write` sets it, too.
+    State,
+}
+
+/// Values that a command takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// Any that are finite.
+    Reals,
+    /// The same, but 0 for dofs of free bodies, which have no drive.
+    Targets,
+    /// 0 or 1.
+    Switches,
+}
+
 /// A dimension after `worlds`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -66,6 +97,8 @@ pub enum Axis {
     Rows,
     /// Contacts that a world has room for.
     Contacts,
+    /// Collision shapes.
+    Shapes,
     /// Sites.
     Sites,
     /// Rays of all height scans.
@@ -101,6 +134,7 @@ impl Axis {
             Axis::Bodies => sizes.bodies,
             Axis::Rows => sizes.rows,
             Axis::Contacts => sizes.contacts,
+            Axis::Shapes => sizes.shapes,
             Axis::Sites => sizes.sites,
             Axis::ScanRays => sizes.scan_rays,
             Axis::ContactSensors => sizes.contact_sensors,
@@ -124,6 +158,7 @@ impl Axis {
             Axis::Bodies => "bodies".into(),
             Axis::Rows => "rows".into(),
             Axis::Contacts => "contacts".into(),
+            Axis::Shapes => "shapes".into(),
             Axis::Sites => "sites".into(),
             Axis::ScanRays => "scan_rays".into(),
             Axis::ContactSensors => "contact_sensors".into(),
@@ -149,6 +184,8 @@ pub struct FieldRow {
     pub name: &'static str,
     /// Who may write it.
     pub group: Group,
+    /// Of a command, how it is kept.
+    pub command: Option<Command>,
     /// Dimensions after `worlds`.
     pub shape: &'static [Axis],
     /// Unit; `–` for none.
@@ -160,6 +197,21 @@ pub struct FieldRow {
     /// What it is.
     pub doc: &'static str,
 }
+
+const fn command(keeper: Keeper, takes: Takes, stops: bool) -> Command {
+    Command {
+        keeper,
+        takes,
+        stops,
+    }
+}
+// what commands of the table are
+pub(super) const FORCE: Command = command(Keeper::Drive, Takes::Reals, true);
+pub(super) const TARGET: Command = command(Keeper::Drive, Takes::Targets, false);
+pub(super) const RATE: Command = command(Keeper::Drive, Takes::Targets, true);
+pub(super) const CONTROL: Command = command(Keeper::State, Takes::Reals, true);
+pub(super) const PLACE: Command = command(Keeper::State, Takes::Reals, false);
+pub(super) const SWITCH: Command = command(Keeper::State, Takes::Switches, false);
 
 pub(super) const REAL: FieldDtype = FieldDtype::Real;
 pub(super) const F64: FieldDtype = FieldDtype::Fixed(Dtype::F64);
@@ -176,15 +228,22 @@ impl Field {
             .find(|field| field.row().name == name)
     }
 
-    /// Whether a write may set it: a state, or a command that begins with the state of a world, as MuJoCo's do.
-    pub fn is_written(self) -> bool {
-        self.row().group == Group::State || self.is_mujoco_command()
+    /// The commands, in the order of the table.
+    pub fn commands() -> impl Iterator<Item = Field> {
+        let all = Field::ALL.iter().copied();
+        all.filter(|field| field.row().command.is_some())
     }
 
-    /// Whether it is a command that only models from MuJoCo take.
-    pub fn is_mujoco_command(self) -> bool {
-        use Field::{Ctrl, EqActive, MocapPos, MocapQuat};
-        matches!(self, Ctrl | MocapPos | MocapQuat | EqActive)
+    /// Whether a write may set it: a state, or a command that the state keeps.
+    pub fn is_written(self) -> bool {
+        let row = self.row();
+        let kept = row.command.map(|command| command.keeper);
+        row.group == Group::State || kept == Some(Keeper::State)
+    }
+
+    /// Whether every scene has it, even one without a joint. Scenes have other inputs where these have columns.
+    pub fn is_of_joints(self) -> bool {
+        matches!(self.row().shape, [Axis::Dofs | Axis::Coords, ..])
     }
 
     /// Whether it belongs to the state before the last substep where outputs do, as MuJoCo's data after a step: all but the state

@@ -9,6 +9,6 @@ mod table;
 
 pub use crate::constants::Sizes;
 pub use define::Flat;
-pub use fields::{Axis, Dtype, FieldDtype, FieldRow, Group};
+pub use fields::{Axis, Command, Dtype, FieldDtype, FieldRow, Group, Keeper, Takes};
 pub use layout::{Layout, Slot};
 pub use table::{Array, Block, Field, Source, Workspace, Writer};

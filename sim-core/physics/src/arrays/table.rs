@@ -4,11 +4,17 @@
 //! its unit; where clients see it, `=>` its public name, group and shape, and a sentence. Below the arrays stand the outputs
 //! that are made of several: what each is made of ([`Source`]) takes the place of the array.
 //!
+//! `values` that clients see are commands. In place of the group, they name how they are kept, such as `CONTROL`. The checks of the
+//! daemon, the GPU, arguments in Python and documents follow from the row.
+//!
 //! To add an output, add a row here and the line that computes it in the stage that names it in its `WRITES`.
 
 use super::define::{Flat, arrays};
 use super::element::{self, Element};
-use super::fields::{Axis, F64, FieldDtype, FieldRow, Group, I32, REAL, U32, U64};
+use super::fields::{
+    Axis, CONTROL, F64, FORCE, FieldDtype, FieldRow, Group, I32, PLACE, RATE, REAL, SWITCH, TARGET,
+    U32, U64,
+};
 use crate::constants::Constants;
 use crate::constants::options::Integrator;
 use crate::lane::{Num, Real};
@@ -88,19 +94,19 @@ arrays! { m;
     }
     values {
         joint_f: JointF [Scalar; m.dofs.len()] Command "N·m or N"
-            => "joint_f" Command [Dofs], "Joint torques applied, not clamped by the effort limit.";
+            => "joint_f" FORCE [Dofs], "Joint torques applied, not clamped by the effort limit.";
         joint_target_q: JointTargetQ [Scalar; m.dofs.len()] Command "rad or m"
-            => "joint_target_q" Command [Dofs], "Position targets of the drives.";
+            => "joint_target_q" TARGET [Dofs], "Position targets of the drives.";
         joint_target_qd: JointTargetQd [Scalar; m.dofs.len()] Command "rad/s or m/s"
-            => "joint_target_qd" Command [Dofs], "Velocity targets of the drives.";
+            => "joint_target_qd" RATE [Dofs], "Velocity targets of the drives.";
         ctrl: Ctrl [Scalar; m.actuators.all.len()] Command "–"
-            => "ctrl" Command [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
+            => "ctrl" CONTROL [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
         mocap_pos: MocapPos [Scalar; 3 * m.mocaps] Command "m"
-            => "mocap_pos" Command [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
+            => "mocap_pos" PLACE [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
         mocap_quat: MocapQuat [Scalar; 4 * m.mocaps] Command "–"
-            => "mocap_quat" Command [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
+            => "mocap_quat" PLACE [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
         eq_active: EqActive [Scalar; m.switches] Command "–"
-            => "eq_active" Command [Equalities], "1 where an equality of a MuJoCo model acts, 0 where it does not.";
+            => "eq_active" SWITCH [Equalities], "1 where an equality of a MuJoCo model acts, 0 where it does not.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd
         command_history: CommandHistory [Scalar; m.delay.frames * 3 * m.dofs.len()] Command "–";
         // parameters of the model that vary from world to world, see `constants::params::Varying`

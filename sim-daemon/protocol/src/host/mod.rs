@@ -64,7 +64,8 @@ pub struct Host {
 impl Host {
     /// Opens the services of a daemon, takes their memory, and announces it.
     ///
-    /// `frame` is the table of a frame ([`Table::over_arena`]). `stop` ends [`Host::wait`] when set. Of `description`, the
+    /// `frame` is the table of a frame ([`Table::over_arena`]). `stops` names the commands that are 0 in worlds whose command is
+    /// late, where these stop. `stop` ends [`Host::wait`] when set. Of `description`, the
     /// host fills in name, session, process, protocol and schema.
     ///
     /// # Errors
@@ -74,6 +75,7 @@ impl Host {
         mut daemon_lock: DaemonLock,
         mut description: Description,
         frame: Table,
+        stops: &[&str],
         stop: Arc<AtomicBool>,
     ) -> Result<Host, ProtocolError> {
         let session = random();
@@ -108,7 +110,7 @@ impl Host {
             _ => description.busy_threads(),
         };
         let inbox = Inbox::for_commands_of(&description);
-        let pacer = Pacer::new(&description);
+        let pacer = Pacer::new(&description, stops);
         let state = State {
             node,
             paths: daemon_lock.paths().clone(),

@@ -15,9 +15,6 @@ const LONGEST: u64 = 60_000_000_000;
 /// Digits that are kept of a duration.
 const DIGITS: u8 = 2;
 
-/// Commands that are zero when worlds stop; targets of positions stay.
-const STOPPED: [&str; 4] = ["joint_f", "joint_target_qd", "ctrl", "body_f"];
-
 /// The pace of a run, and what was measured of it. Without a pace it only measures.
 #[derive(Debug)]
 pub(super) struct Pacer {
@@ -46,14 +43,15 @@ pub(super) struct Pacer {
 }
 
 impl Pacer {
-    pub(super) fn new(description: &Description) -> Pacer {
+    /// `stops` names the commands that are 0 when worlds stop.
+    pub(super) fn new(description: &Description, stops: &[&str]) -> Pacer {
         let pace = description.pace;
         let may_stop = pace.is_some_and(|pace| {
             pace.late == Late::Stop || pace.late == Late::Hold && pace.command_timeout_ns.is_some()
         });
         let commands = description.commands.iter();
-        let stopped = commands
-            .filter(|input| may_stop && input.columns > 0 && STOPPED.contains(&&*input.name));
+        let stopped =
+            commands.filter(|input| may_stop && input.columns > 0 && stops.contains(&&*input.name));
         let zeros = stopped.map(|input| {
             let zeros = vec![0.0; description.worlds * input.columns];
             (input.name.clone(), zeros)

@@ -207,7 +207,7 @@ pub struct KeyframeInfo {
 }
 
 /// Ranges of one robot, each `[start, stop)`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RobotRange {
     /// Name of the robot.
     pub name: String,
@@ -268,7 +268,57 @@ pub struct InputInfo {
     pub doc: String,
 }
 
+/// Axes whose entries have names, in the order of [`Description::schema_hash`].
+const NAMED_AXES: [&str; 10] = [
+    "dofs",
+    "coords",
+    "bodies",
+    "shapes",
+    "sites",
+    "contact_sensors",
+    "actuators",
+    "activations",
+    "mocaps",
+    "equalities",
+];
+
+impl RobotRange {
+    /// Its part of an axis, such as "dofs", if robots have parts of it.
+    pub fn columns(&self, axis: &str) -> Option<[usize; 2]> {
+        match axis {
+            "dofs" => Some(self.dofs),
+            "coords" => Some(self.coords),
+            "bodies" => Some(self.bodies),
+            "actuators" => Some(self.actuators),
+            _ => None,
+        }
+    }
+
+    /// Whether robots have parts of an axis.
+    pub fn has(axis: &str) -> bool {
+        RobotRange::default().columns(axis).is_some()
+    }
+}
+
 impl Description {
+    /// Names of what an axis of a field has an entry for, such as "dofs"; none where it has no names.
+    pub fn names(&self, axis: &str) -> Option<&[String]> {
+        let names = match axis {
+            "dofs" => &self.dof_names,
+            "coords" => &self.coord_names,
+            "bodies" => &self.body_names,
+            "shapes" => &self.shape_names,
+            "sites" => &self.site_names,
+            "contact_sensors" => &self.contact_sensor_names,
+            "actuators" => &self.actuator_names,
+            "activations" => &self.activation_names,
+            "mocaps" => &self.mocap_names,
+            "equalities" => &self.equality_names,
+            _ => return None,
+        };
+        Some(names)
+    }
+
     /// FNV-1a over everything that decides how bytes are read: both sides compute it and must agree.
     pub fn schema_hash(&self) -> u64 {
         let mut hash = crate::wire::hash::Fnv::new();
@@ -277,21 +327,9 @@ impl Description {
         hash.number(self.frames_held as u64);
         hash.number(self.watch_worlds as u64);
         hash.number(self.watch_state_bytes);
-        self.dof_names.iter().for_each(|name| hash.text(name));
-        self.coord_names.iter().for_each(|name| hash.text(name));
-        self.body_names.iter().for_each(|name| hash.text(name));
-        self.shape_names.iter().for_each(|name| hash.text(name));
-        self.site_names.iter().for_each(|name| hash.text(name));
-        self.contact_sensor_names
-            .iter()
-            .for_each(|name| hash.text(name));
-        let actuators = self.actuator_names.iter();
-        let all = actuators
-            .chain(&self.activation_names)
-            .chain(&self.mocap_names)
-            .chain(&self.equality_names)
-            .chain(&self.sensor_names);
-        all.for_each(|name| hash.text(name));
+        let named = NAMED_AXES.iter().filter_map(|axis| self.names(axis));
+        let names = named.flatten().chain(&self.sensor_names);
+        names.for_each(|name| hash.text(name));
         for field in &self.fields {
             hash.text(&field.name);
             hash.number(field.dtype as u64);

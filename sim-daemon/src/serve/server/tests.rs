@@ -62,6 +62,7 @@ fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
         daemon_lock,
         announced,
         table,
+        &export::stops(),
         Arc::new(AtomicBool::new(false)),
     )
     .unwrap();

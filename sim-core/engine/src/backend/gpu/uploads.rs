@@ -10,11 +10,11 @@ use super::compiled::{Compiled, constant};
 use super::kernels::bookkeeping;
 use super::kernels::places::Places;
 use super::kernels::workgroups::BOOKKEEPING;
+use crate::backend::state::array_of;
 use crate::backend::{BackendError, Input};
 use sim_device::{
     AdapterKind, Batch, BatchBuilder, Buffer, Device, DeviceError, Program, Replay, Staging,
 };
-use sim_physics::arrays::Field;
 use sim_physics::constants::Constants;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -29,26 +29,16 @@ pub(super) enum Rows {
     Counters,
 }
 
-/// The commands of a model, with their columns: those of the joints, of models from MuJoCo, and the loads that vary.
+/// The commands that a model has, with their columns.
 pub(super) fn commands(m: &Constants<f32>) -> impl Iterator<Item = (Input, usize)> {
-    let joints = [Field::JointF, Field::JointTargetQ, Field::JointTargetQd];
-    let joints = joints.map(|field| (Input::Field(field), m.dofs.len()));
-    let actuators = m.actuators.all.len();
-    let mocaps = m.mocaps;
-    let models = [
-        (Field::Ctrl, actuators),
-        (Field::MocapPos, 3 * mocaps),
-        (Field::MocapQuat, 4 * mocaps),
-        (Field::EqActive, m.switches),
-    ];
-    let models = models.into_iter().filter(|&(_, columns)| columns > 0);
-    let models = models.map(|(field, columns)| (Input::Field(field), columns));
-    let loads = m.varying.params().filter(|param| param.is_load());
-    let loads = loads.map(|param| {
-        let columns = m.varying.range(param).map_or(0, |range| range.len());
-        (Input::Param(param), columns)
-    });
-    joints.into_iter().chain(models).chain(loads)
+    Input::commands().filter_map(move |input| {
+        let columns = match input {
+            Input::Field(field) => array_of(field).scalars(m),
+            Input::Param(param) => m.varying.range(param)?.len(),
+        };
+        let is_of_joints = matches!(input, Input::Field(field) if field.is_of_joints());
+        (is_of_joints || columns > 0).then_some((input, columns))
+    })
 }
 
 /// Whether programs reach host memory only over a bus: they then read copies in the adapter's memory.

@@ -117,7 +117,7 @@ impl Worlds for Counted<'_> {
 fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let daemon_lock = DaemonLock::take(paths).unwrap();
-    let mut host = Host::open(daemon_lock, description(), table, stop).unwrap();
+    let mut host = Host::open(daemon_lock, description(), table, &[], stop).unwrap();
     let mut cleanup = host.client_cleanup();
     ready.send(()).unwrap();
     let (mut count, mut owned) = (0, Vec::new());

@@ -7,7 +7,7 @@ use crate::backend::gpu::uploads::commands;
 use crate::backend::sharing::SharedCommand;
 use crate::backend::{BackendError, Input};
 use sim_device::{Batch, Buffer, Device, DeviceError, Moment, Program, Replay, Source, Staging};
-use sim_physics::arrays::Field;
+use sim_physics::arrays::Takes;
 use sim_physics::constants::{Constants, Motion};
 use std::time::Duration;
 
@@ -25,8 +25,7 @@ pub(super) fn places(
 ) -> (Vec<SharedCommand>, u64) {
     let mut end = first;
     let shared = commands(m).filter(|(input, columns)| {
-        let is_switch = *input == Input::Field(Field::EqActive);
-        matches!(input, Input::Field(_)) && !is_switch && *columns > 0
+        matches!(input, Input::Field(_)) && !takes(*input, Takes::Switches) && *columns > 0
     });
     let placed = shared.map(|(input, columns)| {
         let offset = end;
@@ -38,6 +37,10 @@ pub(super) fn places(
         }
     });
     (placed.collect(), end)
+}
+
+fn takes(input: Input, values: Takes) -> bool {
+    input.kept().is_some_and(|command| command.takes == values)
 }
 
 /// Commands in shared memory. Field order matters: batches are dropped before what they name.
@@ -177,10 +180,7 @@ fn check_batch(
 ) -> Result<Batch, DeviceError> {
     let words = (worlds * place.columns) as u64;
     let mut what = vec![words as u32, place.columns as u32];
-    let is_target = matches!(
-        place.input,
-        Input::Field(Field::JointTargetQ | Field::JointTargetQd)
-    );
+    let is_target = takes(place.input, Takes::Targets);
     let mut no_target = vec![0; place.columns];
     let free = m.bodies.iter().filter(|body| body.motion == Motion::Free);
     for dof in free.filter(|_| is_target).flat_map(|body| body.dofs()) {
