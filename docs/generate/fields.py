@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import tightloop as tl
 from generate.tables import table
+from tightloop.sim.command_rows import COMMANDS, CommandRow
 from tightloop.tasks import cartpole
 
 
@@ -18,6 +20,11 @@ def description() -> dict[str, Any]:
     scene.add_contact_sensor(name="touch", of="ground")
     with tl.launch(scene, worlds=1, device="cpu") as sim:
         return sim.info
+
+
+def _shape(row: CommandRow) -> str:
+    parts = f", {row.parts}" if row.parts > 1 else ""
+    return f"`(worlds, {row.axis}{parts})`"
 
 
 def parts() -> dict[str, str]:
@@ -38,15 +45,13 @@ def parts() -> dict[str, str]:
         ]
 
     real = next(field["dtype"] for field in info["known_fields"] if field["name"] == "joint_q")
-    inputs = {
-        what: [[f"`{entry['name']}`", entry["unit"], entry["doc"]] for entry in info[what]]
-        for what in ("commands", "writes")
-    }
+    written = inspect.signature(tl.Sim.write).parameters
+    writes = [entry for entry in info["known_fields"] if entry["name"] in written]
     params = [[f"`{param['info']['name']}`", param["info"]["unit"], param["info"]["doc"]] for param in info["params"]]
-    named = ["name", "unit", "meaning"]
+    named, shaped = ["name", "unit", "meaning"], ["name", "shape", "unit", "meaning"]
     return {
         "fields": table(["field", "shape", "type", "unit", "meaning"], rows(info["known_fields"], real)),
-        "commands": table(named, inputs["commands"]),
-        "writes": table(named, inputs["writes"]),
+        "commands": table(shaped, [[f"`{row.name}`", _shape(row), row.unit, row.doc] for row in COMMANDS.values()]),
+        "writes": table(shaped, [[f"`{e['name']}`", f"`{e['axes']}`", e["unit"], e["doc"]] for e in writes]),
         "parameters": table(named, params),
     }

@@ -14,7 +14,10 @@ use sim_protocol::{
 use crate::advice::Advice;
 use crate::errors::{protocol, raise};
 use crate::frame::PyFrame;
-use crate::input::{Axis, Inputs, Mask, Seed};
+use crate::input::{InputTable, Mask, Place, Seeds};
+
+/// Names, columns, columns of each name, parts of the robots.
+type Layout = (Vec<String>, usize, usize, Option<Vec<Place>>);
 
 /// A connection to a daemon. `tightloop.Sim` wraps it, and documents its methods.
 #[pyclass(frozen, module = "tightloop._core")]
@@ -23,6 +26,7 @@ pub(crate) struct Client {
     // None once closed; a step that runs in another thread keeps its own reference until it returns
     connection: Mutex<Option<Arc<Connection>>>,
     process: u32,
+    table: InputTable,
     advice: Advice,
     /// `tightloop.gpu.card.Card`, once frames and commands stay on the GPU.
     card: Mutex<Option<Py<PyAny>>>,
@@ -44,6 +48,7 @@ impl Client {
         .map_err(|failure| failure.raised(py))?;
         Ok(Client {
             description: Arc::clone(connection.description()),
+            table: InputTable::new(connection.description()),
             advice: Advice::new(connection.description()),
             connection: Mutex::new(Some(connection.into())),
             process: std::process::id(),
@@ -83,19 +88,31 @@ impl Client {
         Ok(serde_json::to_string(&timing).expect("it is plain data"))
     }
 
-    #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
+    /// Names of the arrays that a step, a write or a reset cannot take as they are.
+    fn unready(&self, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
+        self.table.unready(given)
+    }
+
+    /// What the columns of an input are of: names, the number of columns, how many each name has, and the parts of the
+    /// robots, if it comes by robot. None if the scene does not have it.
+    fn layout(&self, name: &str) -> Option<Layout> {
+        let row = self.table.row(name)?;
+        Some((
+            row.names.clone(),
+            row.columns,
+            row.parts,
+            row.robots.clone(),
+        ))
+    }
+
     fn step(
         &self,
         py: Python<'_>,
-        joint_f: Option<&Bound<'_, PyAny>>,
-        joint_target_q: Option<&Bound<'_, PyAny>>,
-        joint_target_qd: Option<&Bound<'_, PyAny>>,
-        ctrl: Option<&Bound<'_, PyAny>>,
-        more: &Bound<'_, PyDict>,
+        given: &Bound<'_, PyDict>,
         on_device: Option<(u64, u64)>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
+        let inputs = self.table.take(given)?;
         let commands = inputs.commands()?;
         self.advice.step(py, &self.description, &commands)?;
         let frame = self.waiting(py, |hook| match on_device {
@@ -105,19 +122,14 @@ impl Client {
         self.advised(py, frame)
     }
 
-    #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
     fn send(
         &self,
         py: Python<'_>,
-        joint_f: Option<&Bound<'_, PyAny>>,
-        joint_target_q: Option<&Bound<'_, PyAny>>,
-        joint_target_qd: Option<&Bound<'_, PyAny>>,
-        ctrl: Option<&Bound<'_, PyAny>>,
-        more: &Bound<'_, PyDict>,
+        given: &Bound<'_, PyDict>,
         on_device: Option<(u64, u64)>,
     ) -> PyResult<()> {
         let connection = self.connection(py)?;
-        let inputs = self.inputs([joint_f, joint_target_q, joint_target_qd], ctrl, more)?;
+        let inputs = self.table.take(given)?;
         let commands = inputs.commands()?;
         self.advice.step(py, &self.description, &commands)?;
         self.waiting(py, |hook| match on_device {
@@ -135,21 +147,14 @@ impl Client {
     fn write(
         &self,
         py: Python<'_>,
-        joint_q: Option<&Bound<'_, PyAny>>,
-        joint_qd: Option<&Bound<'_, PyAny>>,
-        more: &Bound<'_, PyDict>,
-        mask: Option<&Bound<'_, PyAny>>,
+        given: &Bound<'_, PyDict>,
+        mask: Mask<'_>,
         is_known: bool,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let mut inputs = Inputs::new(&self.description);
-        for (name, value) in more {
-            inputs.add_ready(name.extract()?, &value)?;
-        }
-        inputs.add("joint_q", Axis::Coords, joint_q)?;
-        inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
-        let mask = Mask::new("mask", mask, self.description.worlds)?;
-        let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
+        let inputs = self.table.take(given)?;
+        let commands = inputs.commands()?;
+        let mask = mask.as_ref().map(|mask| mask.as_slice()).transpose()?;
         // a keyframe's values are those of its model
         if !is_known {
             self.advice.write(py, &self.description, &commands, mask)?;
@@ -157,43 +162,22 @@ impl Client {
         self.frame(py, |hook| connection.write(&commands, mask, hook))
     }
 
-    /// Parameters by name, each `(worlds, columns)` in float64, contiguous.
-    fn write_params(
-        &self,
-        py: Python<'_>,
-        params: &Bound<'_, PyDict>,
-        mask: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<PyFrame> {
-        let connection = self.connection(py)?;
-        let mut inputs = Inputs::new(&self.description);
-        for (name, value) in params {
-            inputs.add_ready(name.extract()?, &value)?;
-        }
-        let mask = Mask::new("mask", mask, self.description.worlds)?;
-        let (commands, mask) = (inputs.commands()?, mask.as_slice()?);
-        self.advice.write(py, &self.description, &commands, mask)?;
-        self.frame(py, |hook| connection.write(&commands, mask, hook))
-    }
-
     fn reset(
         &self,
         py: Python<'_>,
-        mask: Option<&Bound<'_, PyAny>>,
-        seed: Option<&Bound<'_, PyAny>>,
-        joint_q: Option<&Bound<'_, PyAny>>,
-        joint_qd: Option<&Bound<'_, PyAny>>,
+        mask: Mask<'_>,
+        seeds: Seeds<'_>,
+        given: &Bound<'_, PyDict>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let mut inputs = Inputs::new(&self.description);
-        inputs.add("joint_q", Axis::Coords, joint_q)?;
-        inputs.add("joint_qd", Axis::Dofs, joint_qd)?;
-        let mask = Mask::new("mask", mask, self.description.worlds)?;
-        let seed = Seed::new(seed, self.description.worlds)?;
-        let (states, mask, seed) = (inputs.commands()?, mask.as_slice()?, seed.as_slice()?);
+        let inputs = self.table.take(given)?;
+        let states = inputs.commands()?;
+        let mask = mask.as_ref().map(|mask| mask.as_slice()).transpose()?;
+        let seeds = seeds.as_ref().map(|seeds| seeds.as_slice()).transpose()?;
         if !states.is_empty() {
             self.advice.write(py, &self.description, &states, mask)?;
         }
-        self.frame(py, |hook| connection.reset_to(&states, mask, seed, hook))
+        self.frame(py, |hook| connection.reset_to(&states, mask, seeds, hook))
     }
 
     fn forward(&self, py: Python<'_>) -> PyResult<PyFrame> {
@@ -215,12 +199,11 @@ impl Client {
         &self,
         py: Python<'_>,
         path: &str,
-        mask: Option<&Bound<'_, PyAny>>,
+        mask: Mask<'_>,
         from_world: Option<u64>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
-        let mask = Mask::new("worlds", mask, self.description.worlds)?;
-        let mask = mask.as_slice()?;
+        let mask = mask.as_ref().map(|mask| mask.as_slice()).transpose()?;
         self.frame(py, |hook| connection.restore(path, mask, from_world, hook))
     }
 
@@ -259,27 +242,6 @@ impl Client {
 }
 
 impl Client {
-    /// The arrays of a step.
-    fn inputs<'py>(
-        &self,
-        by_dof: [Option<&Bound<'py, PyAny>>; 3],
-        ctrl: Option<&Bound<'py, PyAny>>,
-        more: &Bound<'py, PyDict>,
-    ) -> PyResult<Inputs<'_, 'py>> {
-        let mut inputs = Inputs::new(&self.description);
-        for (name, value) in more {
-            inputs.add_ready(name.extract()?, &value)?;
-        }
-        for (field, value) in ["joint_f", "joint_target_q", "joint_target_qd"]
-            .into_iter()
-            .zip(by_dof)
-        {
-            inputs.add(field, Axis::Dofs, value)?;
-        }
-        inputs.add("ctrl", Axis::Actuators, ctrl)?;
-        Ok(inputs)
-    }
-
     fn connection(&self, py: Python<'_>) -> PyResult<Arc<Connection>> {
         let name = &self.description.name;
         if std::process::id() != self.process {

@@ -44,6 +44,27 @@ fn field_names() -> Vec<&'static str> {
     sim_daemon::field_names()
 }
 
+/// Every command of a step: name, axis, columns of each of its entries, unit, sentence, and whether it is a switch, `write`
+/// sets it, and it is a parameter.
+#[pyfunction]
+fn command_rows() -> Vec<CommandRow> {
+    let rows = sim_daemon::command_rows().into_iter();
+    rows.map(|row| {
+        let kinds = [row.is_switch, row.is_written, row.is_param];
+        (row.name, row.axis, row.parts, row.unit, row.doc, kinds)
+    })
+    .collect()
+}
+
+type CommandRow = (
+    &'static str,
+    String,
+    usize,
+    &'static str,
+    &'static str,
+    [bool; 3],
+);
+
 /// Names of all parameters that may vary between worlds.
 #[pyfunction]
 fn param_names() -> Vec<&'static str> {
@@ -80,7 +101,7 @@ mod core {
         scene_to_toml,
     };
     #[pymodule_export]
-    use super::{command_line, field_names, param_names};
+    use super::{command_line, command_rows, field_names, param_names};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -42,12 +42,9 @@ fn culprit(description: &Description, of: &Command<'_>) -> Option<Culprit> {
     };
     let width = of.columns.len();
     let (world, column) = (place / width, of.columns.start + place % width);
-    let names = match of.field {
-        "ctrl" => &description.actuator_names,
-        field if field.starts_with("joint") => &description.dof_names,
-        _ => &Vec::new(),
-    };
-    let owner = match names.get(column) {
+    let (axis, parts) = sim_daemon::input_axis(of.field).unwrap_or((String::new(), 1));
+    let names = description.names(&axis).unwrap_or_default();
+    let owner = match names.get(column / parts) {
         Some(name) => format!(" of `{name}`"),
         None => String::new(),
     };

@@ -158,8 +158,12 @@ def test_imports_follow_the_order_of_the_layers(graph: Graph) -> None:
 
 
 def test_the_compiled_module_imports_what_its_rust_code_names(graph: Graph) -> None:
-    assert {"tightloop.errors", "tightloop.arrays.inputs"} <= graph["tightloop._core"]
+    assert {"tightloop.errors", "tightloop.arrays.frames"} <= graph["tightloop._core"]
     assert graph["tightloop._core"] <= set(graph), "each name is a module"
+
+
+def test_rust_code_converts_no_argument_by_a_call_of_python(graph: Graph) -> None:
+    assert graph["tightloop._core"].isdisjoint({"tightloop.arrays.inputs", "tightloop.arrays.named_columns"})
 
 
 def test_every_layer_entry_is_a_module(graph: Graph) -> None:

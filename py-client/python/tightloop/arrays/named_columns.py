@@ -150,7 +150,7 @@ def _expected(worlds: int, bodies: tuple[int, ...], parts: int) -> str:
 
 
 def _kind(field: str) -> str:
-    return "bodies" if field == "body_f" else "joints"
+    return "bodies" if field.startswith("body_") else "joints"
 
 
 def _matching(

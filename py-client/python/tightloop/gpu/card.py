@@ -23,8 +23,6 @@ from tightloop.gpu.cuda import Import, driver
 
 #: Types of fields, as the daemon and as NumPy name them
 _NUMPY = {"f32": "<f4", "f64": "<f8", "i32": "<i4", "u32": "<u4", "u64": "<u8", "u8": "|u1"}
-#: Columns of a mocap body
-_MOCAP = {"mocap_pos": 3, "mocap_quat": 4}
 
 
 class CardArray:
@@ -84,6 +82,7 @@ class Card:
             field["name"]: (offset, tuple(field["shape"]), np.dtype(_NUMPY[field["dtype"]]))
             for field, offset in zip(info["fields"], there["offsets"], strict=True)
         }
+        self._parts = {field["name"]: _parts(field["axes"]) for field in info["known_fields"]}
         self._commands = {place["name"]: (1 << bit, place) for bit, place in enumerate(there["commands"])}
         self._ready = 0
         # what keeps each frame whose array was dropped, and whether another library had it
@@ -132,8 +131,8 @@ class Card:
             bit, place = self._commands[name]
             columns = place["columns"]
             # mocap bodies come as (…, mocaps, 3), and lie in a row
-            width = _MOCAP.get(name)
-            is_apart = width is not None and tuple(value.shape[-2:]) == (columns // width, width)
+            width = self._parts[name]
+            is_apart = width > 1 and tuple(value.shape[-2:]) == (columns // width, width)
             flat = value.reshape(*value.shape[:-2], columns) if is_apart else value
             check_array(name, flat, self._worlds, columns, self.device)
             shape = (self._worlds, columns)
@@ -162,6 +161,12 @@ class Card:
 
     def _stream(self) -> int:
         return self._library.stream(self.device)
+
+
+def _parts(axes: str) -> int:
+    """Return the columns of each entry of a command, of axes such as ``(worlds, mocaps, 3)``."""
+    last = axes.strip("()").split(", ")[2:]
+    return int(last[0]) if last and last[0].isdecimal() else 1
 
 
 class NoCard:
@@ -193,10 +198,9 @@ class KeepsOnGpu:
         hold the frame, and stay unchanged until you drop them. Do not write to them. Earlier frames have none. After a
         call that fails, later frames have none either, until another call succeeds.
 
-        Commands of `step` and `send` may then be arrays on the GPU, shape ``(worlds, columns)`` or ``(columns,)``:
-        ``joint_f``, ``joint_target_q``, ``joint_target_qd``, ``ctrl``, ``mocap_pos`` and ``mocap_quat``. Nothing passes
-        through the host; one that the daemon refuses or a recorder wants is read back first. Commands by tensor are not
-        checked for likely mistakes.
+        Commands of `step` and `send` may then be arrays on the GPU, shape ``(worlds, columns)`` or ``(columns,)``: all
+        but ``eq_active`` and ``body_f``. Nothing passes through the host; one that the daemon refuses or a recorder
+        wants is read back first. Commands by tensor are not checked for likely mistakes.
 
         Work is ordered on the current stream of torch, or of CuPy where torch is not installed. If you use several
         streams, let the current one wait for the others before you drop a tensor or step.

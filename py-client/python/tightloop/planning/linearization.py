@@ -234,9 +234,7 @@ class _Run:
 
     def _write(self, values: dict[str, Array]) -> Any:
         """Write values to all worlds; return a frame there."""
-        more = {name: array for name, array in values.items() if name not in ("joint_q", "joint_qd")}
-        ready = ready_arrays(self._planner.info, lambda: self._planner.params, "writes", more)
-        return self._planner._client.write(values.get("joint_q"), values.get("joint_qd"), ready, None, True)
+        return self._planner._client.write(ready_arrays(self._planner, dict(values)), None, True)
 
     def _check_status(self, frame: Any, state: Any, row: Any, labels: Sequence[str]) -> None:
         faulted = np.flatnonzero((frame.status & FAULTED) != 0)
@@ -424,7 +422,7 @@ def _tangent(planner: Sim) -> Tangent:
         joint_qd = np.zeros((planner.worlds, len(planner.dof_names)))
         for _, d in tangent.free:
             joint_qd[:, d + 3 + axis] = 1.0
-        frame = planner._client.write(None, joint_qd, {}, None, True)
+        frame = planner._client.write({"joint_qd": joint_qd}, None, True)
         spins.append([np.array(frame.qvel[0, d : d + 3]) for _, d in tangent.free])
         turns = [rotations(np.array(frame.qpos[0, q + 3 : q + 7])) for q, _ in tangent.free]
         if axis == 1:

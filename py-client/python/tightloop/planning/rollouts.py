@@ -14,9 +14,8 @@ from tightloop.arrays.frames import FAULTED, unknown_field
 from tightloop.arrays.inputs import real_numbers, switches
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
+from tightloop.sim.command_rows import COMMANDS
 
-#: Commands of a step.
-_COMMANDS = ("joint_f", "joint_target_q", "joint_target_qd", "ctrl", "mocap_pos", "mocap_quat", "eq_active", "body_f")
 #: Fields of every frame, which are not collected unless they are asked for.
 _ALWAYS = ("time", "step", "status", "contacts_left_out")
 
@@ -154,8 +153,8 @@ def _sequences(commands: Any) -> tuple[dict[str, Any], int]:
         raise ArgumentError(f"rollout: commands is {found}; {cure}")
     ready, lengths = {}, {}
     for name, value in commands.items():
-        if name not in _COMMANDS:
-            raise ArgumentError(f"rollout: commands has {name!r:.80}; {suggestion(str(name), _COMMANDS)}")
+        if name not in COMMANDS:
+            raise ArgumentError(f"rollout: commands has {name!r:.80}; {suggestion(str(name), tuple(COMMANDS))}")
         ready[name] = _ready(name, name, value, lengths)
     if len({*lengths.values()}) != 1:
         found = ", ".join(f"{what} {length}" for what, length in lengths.items()) or "none"
@@ -170,7 +169,7 @@ def _ready(command: str, what: str, value: Any, lengths: dict[str, int]) -> Any:
     if isinstance(value, Mapping):
         return {name: _ready(command, f"{what} of {name!r:.80}", own, lengths) for name, own in value.items()}
     try:
-        array = (switches if command == "eq_active" else real_numbers)(what, value)
+        array = (switches if COMMANDS[command].is_switch else real_numbers)(what, value)
     except CommandRefused as problem:
         raise ArgumentError(f"rollout: commands: {problem}") from None
     if array.ndim == 0 or (array.ndim == 1 and what == command):

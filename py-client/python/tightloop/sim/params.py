@@ -11,24 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop import _core
 from tightloop._core import Frame
 from tightloop.arrays.inputs import as_mask, real_numbers
-from tightloop.arrays.named_columns import Runs, named_columns
+from tightloop.arrays.named_columns import Place, Runs, named_columns
 from tightloop.arrays.written import PropertyArray
 from tightloop.checks.attributes import nearest
 from tightloop.checks.params_advice import ParamsAdvice
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import CommandRefused, ConstantParameter, UnknownField
-
-#: Values per body or site, of parameters with several.
-PARTS = {
-    "body_f": 6,
-    "site_q_noise": 2,
-    "site_qd_noise": 2,
-    "body_inertia": 6,
-    "actuator_gain": 3,
-    "actuator_bias": 3,
-}
-#: Parameters with one value per world.
-SINGLE = ("command_delay",)
+from tightloop.sim.command_rows import COMMANDS
 
 
 @checked_calls
@@ -132,10 +121,10 @@ class Params:
 
     def _write(self, params: Mapping[str, ArrayLike], mask: ArrayLike | None, *, entries: bool = False) -> Frame:
         given = {name: self.ready_columns(name, value) for name, value in params.items()}
+        worlds = None if mask is None else as_mask("mask", mask, self._worlds)
         if self._advice is not None:
-            worlds = None if mask is None else as_mask("mask", mask, self._worlds)
             self._advice.look(given, worlds, self._columns, entries=entries)
-        return self._client.write_params(given, mask)
+        return self._client.write(given, worlds, False)
 
     def _columns(self, name: str) -> NDArray[Any]:
         """Return a parameter as it is, shape ``(worlds, columns)``, in memory of its own."""
@@ -144,12 +133,14 @@ class Params:
         return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
 
     def ready_columns(self, name: str, value: Any) -> NDArray[np.float64] | Runs:
-        """Convert a value as `ready` does or, of a dict of forces by robot, body or pattern, to runs of columns."""
-        if name != "body_f" or not isinstance(value, Mapping):
+        """Convert a value as `ready` does or, of a command's dict by robot, body or pattern, to runs of columns."""
+        if name not in COMMANDS or not isinstance(value, Mapping):
             return self.ready(name, value)
         self._varying(name)
-        robots = [(robot["name"], *robot["bodies"], 0) for robot in self._info["robots"]]
-        return named_columns(name, value, self._worlds, self._info["body_names"], robots, parts=PARTS[name])
+        names, _, parts, robots = self._layout(name)
+        if robots is None:
+            return self.ready(name, value)
+        return named_columns(name, value, self._worlds, names, robots, parts=parts)
 
     def ready(self, name: str, value: Any) -> NDArray[np.float64]:
         """Convert a value of a parameter to a contiguous float64 array, shape ``(worlds, columns)``.
@@ -182,12 +173,17 @@ class Params:
             )
         return self._known[name]
 
+    def _layout(self, name: str) -> tuple[list[str], int, int, list[Place] | None]:
+        """Return what a parameter's columns are of: names, number of columns, columns of each name, parts of robots."""
+        layout = self._client.layout(name)
+        assert layout is not None, "it varies"
+        return layout
+
     def _shape(self, name: str) -> tuple[int, ...]:
-        columns = self._known[name]["info"]["columns"]
-        if name in SINGLE:
-            return (self._worlds,)
-        parts = PARTS.get(name)
-        return (self._worlds, columns) if parts is None else (self._worlds, columns // parts, parts)
+        names, columns, parts, _ = self._layout(name)
+        if parts > 1:
+            return (self._worlds, columns // parts, parts)
+        return (self._worlds,) if columns == 1 and not names else (self._worlds, columns)
 
     def __repr__(self) -> str:
         return f"Params({', '.join(self.names) or 'none varies'})"

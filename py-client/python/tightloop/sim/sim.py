@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tightloop import _core
 from tightloop._core import Frame
+from tightloop.arrays.inputs import as_mask, as_seed
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import Attributes, ByName, nearest
 from tightloop.checks.params_advice import ParamsAdvice
@@ -158,8 +159,17 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             LeaseLost: This client lost control of the daemon.
             DaemonLost: The daemon went away; its state is lost.
         """
-        own, more = (joint_f, joint_target_q, joint_target_qd, ctrl), (mocap_pos, mocap_quat, eq_active, body_f)
-        return self._client.step(*step_arguments(self, own, more))
+        given = {
+            "joint_f": joint_f,
+            "joint_target_q": joint_target_q,
+            "joint_target_qd": joint_target_qd,
+            "ctrl": ctrl,
+            "mocap_pos": mocap_pos,
+            "mocap_quat": mocap_quat,
+            "eq_active": eq_active,
+            "body_f": body_f,
+        }
+        return self._client.step(*step_arguments(self, given))
 
     def send(
         self,
@@ -192,8 +202,17 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             CommandRefused: A shape or dtype is wrong, or a step is in flight; nothing was sent. `recv` reports a wrong
                 value, such as NaN. Other errors are those of `step`.
         """
-        own, more = (joint_f, joint_target_q, joint_target_qd, ctrl), (mocap_pos, mocap_quat, eq_active, body_f)
-        self._client.send(*step_arguments(self, own, more))
+        given = {
+            "joint_f": joint_f,
+            "joint_target_q": joint_target_q,
+            "joint_target_qd": joint_target_qd,
+            "ctrl": ctrl,
+            "mocap_pos": mocap_pos,
+            "mocap_quat": mocap_quat,
+            "eq_active": eq_active,
+            "body_f": body_f,
+        }
+        self._client.send(*step_arguments(self, given))
 
     def recv(self) -> Frame:
         """Wait for the frame of the step that `send` began. After Ctrl-C it may be called again.
@@ -244,12 +263,15 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             ArgumentError: There is no such keyframe or there are several, or joint positions stand beside one.
             TightloopError: As `step`.
         """
+        worlds = None if mask is None else as_mask("mask", mask, self.worlds)
+        seeds = None if seed is None else as_seed(seed, self.worlds)
         if keyframe is None:
-            return self._client.reset(mask, seed, joint_q, joint_qd)
+            states = ready_arrays(self, {"joint_q": joint_q, "joint_qd": joint_qd})
+            return self._client.reset(worlds, seeds, states)
         keyframes.check_alone(joint_q, joint_qd)
-        more = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
-        self._client.reset(mask, seed, None, None)
-        return self._client.write(more.pop("joint_q", None), more.pop("joint_qd", None), self._ready(more), mask, True)
+        states = ready_arrays(self, keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe)))
+        self._client.reset(worlds, seeds, {})
+        return self._client.write(states, worlds, True)
 
     def write(
         self,
@@ -285,11 +307,17 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         Returns:
             A frame at the new state. Raises as `step` does.
         """
-        given = {"act": act, "ctrl": ctrl, "mocap_pos": mocap_pos, "mocap_quat": mocap_quat, "eq_active": eq_active}
-        return self._client.write(joint_q, joint_qd, self._ready(given), mask, False)
-
-    def _ready(self, given: dict[str, Any]) -> dict[str, Any]:
-        return ready_arrays(self.info, lambda: self.params, "writes", given)
+        given = {
+            "joint_q": joint_q,
+            "joint_qd": joint_qd,
+            "act": act,
+            "ctrl": ctrl,
+            "mocap_pos": mocap_pos,
+            "mocap_quat": mocap_quat,
+            "eq_active": eq_active,
+        }
+        worlds = None if mask is None else as_mask("mask", mask, self.worlds)
+        return self._client.write(ready_arrays(self, given), worlds, False)
 
     def forward(self) -> Frame:
         """Return a frame at the current state and commands without a step. Raises as `step` does."""
@@ -367,8 +395,9 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         if from_world is not None:
             from_world = checks.integer("restore: from_world", from_world, least=0, error=CommandRefused)
             snapshot._check_world(from_world)
+        mask = None if worlds is None else as_mask("worlds", worlds, self.worlds)
         with transfer_file(self.pid, snapshot.to_bytes()) as path:
-            return self._client.restore(path, worlds, from_world)
+            return self._client.restore(path, mask, from_world)
 
     @property
     def params(self) -> Params:

@@ -62,9 +62,7 @@ class SettableState:
         given = [_rows(name, array, self.num_envs) for name, array in (("qpos", qpos), ("qvel", qvel))]
         arrays = {name: np.ascontiguousarray(array) for name, array in self.task.states_of(*given).items()}
         # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
-        joint_q, joint_qd = arrays.pop("joint_q", None), arrays.pop("joint_qd", None)
-        more = ready_arrays(self.sim.info, lambda: self.sim.params, "writes", arrays)
-        frame = self.sim._client.write(joint_q, joint_qd, more, every, True)
+        frame = self.sim._client.write(ready_arrays(self.sim, arrays), np.ascontiguousarray(every), True)
         self._see(frame)
         self._memory.begin(np.flatnonzero(every), self.evaluation)
         self._see(frame)

@@ -223,9 +223,7 @@ class Engine:
 
     def _write_states(self, parts: dict[str, Array], mask: Mask | None = None) -> Frame:
         """Write states of MuJoCo's order, which the warnings of quaternions in another order would not fit."""
-        joint_q, joint_qd = parts.pop("joint_q"), parts.pop("joint_qd")
-        more = ready_arrays(self.sim.info, lambda: self.sim.params, "writes", parts)
-        return self.sim._client.write(joint_q, joint_qd, more, mask, True)
+        return self.sim._client.write(ready_arrays(self.sim, parts), mask, True)
 
     def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
         """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
