@@ -135,7 +135,7 @@ def test_a_wrong_name_is_refused_and_nothing_changes(scene, arguments, named):
 def test_whatever_is_given_is_taken_or_refused_by_name(scene):
     """Every argument with everything that is no distribution, alone, under a name, and under a name in a name."""
     scene.randomize(joint_q={"arm": SOME}, params={"gravity": {"z": SOME}})
-    kept = copy.deepcopy(scene._offsets)
+    kept = copy.deepcopy(scene._distributions)
     leaves = [None, True, 0, math.nan, "", "arm", b"arm", (), [], {}, [SOME], (SOME, SOME), tl.Uniform, object(), SOME]
     names = [
         "arm",
@@ -163,11 +163,11 @@ def test_whatever_is_given_is_taken_or_refused_by_name(scene):
                 scene.randomize(**{argument: given})
             except tl.SceneError as error:
                 assert argument in str(error) or "randomize: " in str(error), given
-                assert scene._offsets == kept, given
+                assert scene._distributions == kept, given
             else:
-                taken += scene._offsets != kept
+                taken += scene._distributions != kept
                 assert tl.Scene.to_toml(scene)
-                scene._offsets = copy.deepcopy(kept)
+                scene._distributions = copy.deepcopy(kept)
     # a distribution under each name that there is, and of parameters under any that can be written
     assert taken > 20
 

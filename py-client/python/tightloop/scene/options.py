@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -11,9 +11,7 @@ import numpy as np
 from tightloop import _core
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Triple, Vector
-from tightloop.checks.attributes import Attributes, suggestion
-from tightloop.checks.running import Running
-from tightloop.checks.signatures import checked_calls
+from tightloop.checks.attributes import suggestion
 from tightloop.errors import SceneError
 
 Cone = Literal["elliptic", "pyramidal"]
@@ -31,7 +29,99 @@ class Solver:
     impratio: float = 1000.0
 
 
-def capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
+@dataclass(frozen=True)
+class Options:
+    """The options of a scene; see `tightloop.Scene`, which gives them their values."""
+
+    dt: float = 1 / 480
+    substeps: int = 8
+    gravity: Triple = (0.0, 0.0, -9.81)
+    contacts_max: int | None = None
+    rows_max: int | None = None
+    params: tuple[str, ...] = ()
+    command_delay_max: int | None = None
+    friction_combine: FrictionCombine = "max"
+    solver: Solver = Solver()
+
+
+#: The options that are arguments of `tightloop.Scene`.
+NAMES = tuple(field.name for field in fields(Options) if field.name != "solver")
+
+
+def checked_dt(dt: SupportsFloat) -> float:
+    """Check a time step [s]."""
+    return checks.number("Scene: dt", dt, above=0.0)
+
+
+def checked_substeps(substeps: SupportsIndex) -> int:
+    """Check a number of physics steps per control frame."""
+    return checks.integer("Scene: substeps", substeps)
+
+
+def checked_gravity(gravity: Vector) -> Triple:
+    """Check an acceleration of gravity [m/s²].
+
+    Raises:
+        SceneError: It is no vector of three finite numbers.
+    """
+    if np.ndim(gravity) == 0:
+        raise SceneError(f"Scene: gravity is {gravity!r}; give 3 numbers, with z up, such as (0, 0, -9.81)")
+    return checks.triple("Scene: gravity", gravity)
+
+
+def checked_params(params: Iterable[str]) -> tuple[str, ...]:
+    """Check names of parameters.
+
+    Raises:
+        SceneError: They are no list of names, or there is no such parameter.
+    """
+    if isinstance(params, str) or not isinstance(params, Iterable):
+        raise SceneError(f"Scene: params is {params!r}; give a list of names")
+    checked = tuple(checks.text("Scene: an entry of params", param) for param in params)
+    for param in checked:
+        if param not in (known := _core.param_names()):
+            raise SceneError(f"Scene: params has {param!r}, and there is no such parameter; {suggestion(param, known)}")
+    return checked
+
+
+def checked_command_delay_max(command_delay_max: SupportsIndex | None, substeps: int) -> int | None:
+    """Check the largest delay of commands [substeps]."""
+    return _capacity("command_delay_max", command_delay_max, 1000 * substeps)
+
+
+def checked_contacts_max(contacts_max: SupportsIndex | None) -> int | None:
+    """Check a capacity for contacts."""
+    return _capacity("contacts_max", contacts_max, 4096)
+
+
+def checked_rows_max(rows_max: SupportsIndex | None) -> int | None:
+    """Check a capacity for constraint rows."""
+    return _capacity("rows_max", rows_max, 16384)
+
+
+def checked_friction_combine(friction_combine: FrictionCombine) -> FrictionCombine:
+    """Check how coefficients of friction combine."""
+    checks.choice("friction_combine", friction_combine, ("max", "mean", "min", "product"))
+    return friction_combine
+
+
+def checked_solver(iterations: int, ls_iterations: int, tolerance: float, cone: Cone, impratio: float) -> Solver:
+    """Check the arguments of `Scene.solver`.
+
+    Raises:
+        SceneError: A value is out of range.
+    """
+    checks.choice("cone", cone, ("elliptic", "pyramidal"))
+    return Solver(
+        iterations=checks.integer("solver: iterations", iterations),
+        ls_iterations=checks.integer("solver: ls_iterations", ls_iterations),
+        tolerance=checks.number("solver: tolerance", tolerance, least=0.0),
+        cone=cone,
+        impratio=checks.number("solver: impratio", impratio, above=0.0),
+    )
+
+
+def _capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
     """Check a capacity; None stands for the default.
 
     Raises:
@@ -43,147 +133,3 @@ def capacity(what: str, value: SupportsIndex | None, most: int) -> int | None:
     if checked > most:
         raise SceneError(f"Scene: {what} is {checked}; it must be at most {most}")
     return checked
-
-
-@checked_calls
-class SceneOptions(Attributes):
-    """Mixin of `Scene` with its options."""
-
-    __slots__ = (
-        "_command_delay_max",
-        "_contacts_max",
-        "_dt",
-        "_friction_combine",
-        "_gravity",
-        "_params",
-        "_rows_max",
-        "_running",
-        "_solver",
-        "_substeps",
-    )
-
-    def __init__(self) -> None:
-        self._running = Running()
-        self._solver = Solver()
-
-    def _changed(self, attribute: str) -> None:
-        running = getattr(self, "_running", None)  # which a copy gets last
-        if running is not None:
-            running.tell("Scene", attribute)
-
-    @property
-    def dt(self) -> float:
-        """Length of a physics step [s]."""
-        return self._dt
-
-    @dt.setter
-    def dt(self, dt: SupportsFloat) -> None:
-        self._dt = checks.number("Scene: dt", dt, above=0.0)
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps per control frame."""
-        return self._substeps
-
-    @substeps.setter
-    def substeps(self, substeps: SupportsIndex) -> None:
-        self._substeps = checks.integer("Scene: substeps", substeps)
-
-    @property
-    def gravity(self) -> Triple:
-        """Acceleration of gravity [m/s²], world axes."""
-        return self._gravity
-
-    @gravity.setter
-    def gravity(self, gravity: Vector) -> None:
-        if np.ndim(gravity) == 0:
-            raise SceneError(f"Scene: gravity is {gravity!r}; give 3 numbers, with z up, such as (0, 0, -9.81)")
-        self._gravity = checks.triple("Scene: gravity", gravity)
-
-    @property
-    def params(self) -> tuple[str, ...]:
-        """Model parameters that vary between worlds, besides those named at launch; see `launch`."""
-        return self._params
-
-    @params.setter
-    def params(self, params: Iterable[str]) -> None:
-        if isinstance(params, str) or not isinstance(params, Iterable):
-            raise SceneError(f"Scene: params is {params!r}; give a list of names")
-        checked = tuple(checks.text("Scene: an entry of params", param) for param in params)
-        for param in checked:
-            if param not in (known := _core.param_names()):
-                raise SceneError(
-                    f"Scene: params has {param!r}, and there is no such parameter; {suggestion(param, known)}"
-                )
-        self._params = checked
-
-    @property
-    def command_delay_max(self) -> int | None:
-        """Largest ``command_delay`` of a world [substeps]; None is four control frames."""
-        return self._command_delay_max
-
-    @command_delay_max.setter
-    def command_delay_max(self, command_delay_max: SupportsIndex | None) -> None:
-        most = 1000 * self.substeps
-        self._command_delay_max = capacity("command_delay_max", command_delay_max, most)
-
-    @property
-    def contacts_max(self) -> int | None:
-        """Capacity for contacts of a world; None is as many as its shapes can have, at most 512."""
-        return self._contacts_max
-
-    @contacts_max.setter
-    def contacts_max(self, contacts_max: SupportsIndex | None) -> None:
-        self._contacts_max = capacity("contacts_max", contacts_max, 4096)
-
-    @property
-    def rows_max(self) -> int | None:
-        """Capacity for constraint rows of contacts of a world; None is as many as its contacts need."""
-        return self._rows_max
-
-    @rows_max.setter
-    def rows_max(self, rows_max: SupportsIndex | None) -> None:
-        self._rows_max = capacity("rows_max", rows_max, 16384)
-
-    def solver(
-        self,
-        *,
-        iterations: int = 20,
-        ls_iterations: int = 100,
-        tolerance: float = 1e-8,
-        cone: Cone = "elliptic",
-        impratio: float = 1000.0,
-    ) -> None:
-        """Set the options of the constraint solver (primal Newton with exact line search).
-
-        Args:
-            iterations: Largest number of Newton iterations per physics step.
-            ls_iterations: Largest number of line-search iterations per Newton iteration.
-            tolerance: The solver stops when its scaled improvement is smaller [–]; at 0 only rounding stops it.
-            cone: Friction cone of contacts, ``"elliptic"`` or ``"pyramidal"``.
-            impratio: Ratio of frictional to normal impedance of contacts [–], above 0, at most 1e5. In float32, the
-                edges of a pyramidal cone are at most 1e4 times as stiff as its normal. MuJoCo's edges exceed this limit
-                if ``mu`` is below 0.22 at an impratio of 1000.
-
-        Raises:
-            SceneError: A value is out of range; the message names it.
-        """
-        checks.choice("cone", cone, ("elliptic", "pyramidal"))
-        self._changed("solver")
-        self._solver = Solver(
-            iterations=checks.integer("solver: iterations", iterations),
-            ls_iterations=checks.integer("solver: ls_iterations", ls_iterations),
-            tolerance=checks.number("solver: tolerance", tolerance, least=0.0),
-            cone=cone,
-            impratio=checks.number("solver: impratio", impratio, above=0.0),
-        )
-
-    @property
-    def friction_combine(self) -> FrictionCombine:
-        """How the coefficients of friction of two shapes combine."""
-        return self._friction_combine
-
-    @friction_combine.setter
-    def friction_combine(self, friction_combine: FrictionCombine) -> None:
-        checks.choice("friction_combine", friction_combine, ("max", "mean", "min", "product"))
-        self._friction_combine: FrictionCombine = friction_combine
