@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
-from tightloop.gpu.card import Card, KeepsOnGpu
+from tightloop.gpu.card import Card
 from tightloop.gpu.cuda import Import
 
 WORLDS = 3
@@ -262,11 +262,10 @@ class Connection:
         self.card = card
 
 
-class Simulation(KeepsOnGpu):
-    info = INFO
-
+class Simulation(tl.Sim):
     def __init__(self, client: Connection) -> None:
-        self._client = client
+        self.info = INFO
+        self._client = cast(Any, client)
 
 
 def test_a_second_card_that_fails_leaves_frames_without_tensors_until_one_succeeds(memory, monkeypatch):

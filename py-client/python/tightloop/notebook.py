@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
-
-from tightloop.checks.signatures import checked_calls
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -60,50 +58,22 @@ def frame_html(frame: Any) -> str:
     return table("Frame", ("field", "shape", "type", "least … largest"), rows)
 
 
-@checked_calls
-class Shown:
-    """Mixin of `Sim`: how it shows itself in a notebook."""
+def simulation_picture(sim: Any, **given: Any) -> Image:
+    """Return a picture of worlds of a simulation; the arguments are those of `Sim.picture`."""
+    # the meshes stay loaded until the simulation is closed
+    return cast("Image", _view("stills").of_simulation(sim, **given))
 
-    name: str
-    worlds: int
-    info: dict[str, Any]
 
-    def picture(
-        self,
-        *,
-        worlds: int | Sequence[int] = 1,
-        camera: Any = None,
-        size: tuple[int, int] = (640, 480),
-        frame: Any = None,
-    ) -> Image:
-        """Return a picture of worlds, which a notebook shows and ``save`` writes.
-
-        Args:
-            worlds: How many worlds are drawn on a grid, the first ones; or a list of them.
-            camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `tightloop.view.Camera`.
-                If left out, it follows a single world whose robot floats.
-            size: Width and height [pixels].
-            frame: A frame with ``body_q``; that of `forward` if left out.
-
-        Raises:
-            ArgumentError: A world, camera or size does not exist.
-            UnknownField: The frame carries no ``body_q``.
-            MissingLibrary: The extra ``view`` is not installed.
-        """
-        # the meshes stay loaded until the simulation is closed
-        given = {"worlds": worlds, "camera": camera, "size": size, "frame": frame}
-        return cast("Image", _view("stills").of_simulation(self, **given))
-
-    def _repr_html_(self) -> str:
-        info = self.info
-        rows = [
-            ("worlds", self.worlds),
-            ("device", info["device"]),
-            ("precision", info["precision"]),
-            ("step", f"{info['substeps']} × {info['dt']:.6g} s"),
-            ("robots", ", ".join(robot["name"] for robot in info["robots"]) or "none"),
-            ("dofs", len(info["dof_names"])),
-            ("fields", ", ".join(field["name"] for field in info["fields"])),
-            ("process", info["pid"]),
-        ]
-        return table(f"Sim {self.name}", (), rows)
+def simulation_html(name: str, worlds: int, info: Mapping[str, Any]) -> str:
+    """Return the properties of a simulation as HTML."""
+    rows = [
+        ("worlds", worlds),
+        ("device", info["device"]),
+        ("precision", info["precision"]),
+        ("step", f"{info['substeps']} × {info['dt']:.6g} s"),
+        ("robots", ", ".join(robot["name"] for robot in info["robots"]) or "none"),
+        ("dofs", len(info["dof_names"])),
+        ("fields", ", ".join(field["name"] for field in info["fields"])),
+        ("process", info["pid"]),
+    ]
+    return table(f"Sim {name}", (), rows)

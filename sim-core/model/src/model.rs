@@ -141,14 +141,14 @@ impl Model {
             Axis::Activations => self.activation_names.clone(),
             Axis::Mocaps => self.mocap_names.clone(),
             Axis::Equalities => self.equality_names.clone(),
-            Axis::MujocoSites => self.mujoco_site_names.clone(),
+            Axis::OutputSites => self.output_site_names.clone(),
             Axis::Size(3) => ["x", "y", "z"].map(str::to_owned).to_vec(),
             Axis::Size(n) => (0..n).map(|k| k.to_string()).collect(),
             Axis::Rows
             | Axis::Contacts
             | Axis::ScanRays
-            | Axis::MujocoBodies
-            | Axis::MujocoGeoms
+            | Axis::OutputBodies
+            | Axis::OutputGeoms
             | Axis::Sensordata => Vec::new(),
         }
     }

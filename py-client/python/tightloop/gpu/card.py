@@ -185,55 +185,38 @@ class NoCard:
     torch = array
 
 
-class KeepsOnGpu:
-    """Part of `tightloop.Sim`: frames and commands that stay on the GPU."""
+def library_for(info: Mapping[str, Any]) -> ArrayLibrary:
+    """Return the array library for frames on the GPU of a simulation, given its `Sim.info`.
 
-    _card: Card | None = None
+    Raises:
+        GpuMemoryError: The worlds are on the CPU, CUDA is not there, or the system is not Linux.
+        MissingLibrary: ``cuda-bindings``, or both torch and CuPy, are not installed.
+    """
+    if not system.shares_gpu_memory():
+        raise GpuMemoryError(
+            "keep_on_gpu: processes share GPU memory on Linux only; read frames as NumPy arrays, or run on Linux"
+        )
+    if not info["adapter"]:
+        raise GpuMemoryError('keep_on_gpu: the worlds are on the CPU; launch with device="gpu"')
+    library = array_library()
+    driver()  # before the daemon takes memory
+    return library
 
-    def keep_on_gpu(self) -> Card:
-        """Keep frames and commands on the GPU, too, until this client gives up control.
 
-        From the next frame on, ``frame.torch("joint_q")`` returns a tensor of torch in the memory that the daemon
-        writes, and ``frame.cuda("joint_q")`` an array for CuPy and JAX. Both are as valid as ``frame.joint_q``: they
-        hold the frame, and stay unchanged until you drop them. Do not write to them. Earlier frames have none. After a
-        call that fails, later frames have none either, until another call succeeds.
+def open_card(info: Mapping[str, Any], client: Any, library: ArrayLibrary) -> Card:
+    """Map the daemon's device memory, and let the client keep frames there.
 
-        Commands of `step` and `send` may then be arrays on the GPU, shape ``(worlds, columns)`` or ``(columns,)``: all
-        but ``eq_active`` and ``body_f``. Nothing passes through the host; one that the daemon refuses or a recorder
-        wants is read back first. Commands by tensor are not checked for likely mistakes.
+    Args:
+        info: `Sim.info`.
+        client: The compiled client of the simulation, which is in a layer above.
+        library: The array library of the frames.
 
-        Work is ordered on the current stream of torch, or of CuPy where torch is not installed. If you use several
-        streams, let the current one wait for the others before you drop a tensor or step.
-
-        A frame whose tensors you dropped counts as held until the next command other than `recv`, since queued work may
-        still read it. If JAX or another library had one by DLPack, that command first waits for the whole GPU.
-
-        Returns:
-            The card, with ``device``, the index of the CUDA device, and ``order``: ``"timelines"``, or ``"host: …"``
-            with the reason why each step waits for the stream.
-
-        Raises:
-            GpuMemoryError: The worlds are on the CPU, the driver exports no memory, CUDA does not see that GPU, or the
-                system is not Linux.
-            MissingLibrary: ``cuda-bindings``, or both torch and CuPy, are not installed.
-            LeaseHeld: Another client controls the daemon. Other errors are those of `step`.
-        """
-        if not system.shares_gpu_memory():
-            raise GpuMemoryError(
-                "keep_on_gpu: processes share GPU memory on Linux only; read frames as NumPy arrays, or run on Linux"
-            )
-        info, client = self.info, self._client  # type: ignore[attr-defined]
-        if not info["adapter"]:
-            raise GpuMemoryError('keep_on_gpu: the worlds are on the CPU; launch with device="gpu"')
-        library = array_library()
-        driver()  # before the daemon takes memory
-        client.land()  # with a step in flight the request is refused, and the card stays
-        # from here on the daemon may write other memory than an earlier card maps
-        self._card = None
-        client.keep_on(NoCard())
-        text, descriptors = client.device_memory()
-        there = json.loads(text)
-        card = Card(info, there, Import(there, descriptors), library)
-        self._card = card
-        client.keep_on(card)
-        return card
+    Raises:
+        GpuMemoryError: The driver exports no memory, or CUDA does not see that GPU.
+    """
+    client.keep_on(NoCard())
+    text, descriptors = client.device_memory()
+    there = json.loads(text)
+    card = Card(info, there, Import(there, descriptors), library)
+    client.keep_on(card)
+    return card

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +12,6 @@ from tightloop._core import Frame
 from tightloop.arrays.frames import FrameCopy
 from tightloop.arrays.inputs import reals
 from tightloop.checks import arguments as checks
-from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SceneError, UnknownField
 
 Array = NDArray[Any]
@@ -188,51 +185,3 @@ def points(name: str, value: ArrayLike) -> Array:
     if not np.isfinite(given).all():
         raise ArgumentError(f"rays: {name} has a value that is NaN or infinite")
     return given
-
-
-@checked_calls
-class CastsRays:
-    """Part of `tightloop.Sim`: rays against the geoms of its MuJoCo models."""
-
-    info: dict[str, Any]
-    threads: int
-    bodies: Mapping[str, slice]
-
-    def forward(self) -> Frame:
-        """Return a frame at the current state."""
-        raise NotImplementedError
-
-    @functools.cached_property
-    def _ray_scene(self) -> Rays:
-        firsts = {name: bodies.start for name, bodies in self.bodies.items()}
-        return Rays(self.info["scene"], self.info["scene_folder"], firsts, len(self.info["body_names"]))
-
-    def rays(
-        self,
-        pnt: ArrayLike,
-        vec: ArrayLike,
-        *,
-        geomgroup: ArrayLike | None = None,
-        flg_static: bool = True,
-        bodyexclude: ArrayLike = -1,
-        frame: Frame | FrameCopy | None = None,
-    ) -> RayHits:
-        """Find what rays meet first of the geoms of MuJoCo models, as ``mj_ray`` does, in this process.
-
-        Args:
-            pnt: Origins in the world [m]. It and ``vec`` broadcast to ``(worlds, rays, 3)``: ``(rays, 3)`` counts for
-                all worlds, ``(3,)`` for all rays.
-            vec: Directions; their lengths are the units of the distances.
-            geomgroup: Six flags, which groups of geoms count; all if left out.
-            flg_static: Whether geoms of bodies that are welded to the world count.
-            bodyexclude: Place in `body_names` of a body to pass through, or -1; also one per world or per ray.
-            frame: A frame with ``body_q``, or with ``geom_xpos`` and ``geom_xmat``; that of `forward` if left out.
-
-        Raises:
-            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is an SDF.
-            SceneError: A model's file cannot be read here, or no model of the scene has geoms.
-            UnknownField: The frame has no poses.
-        """
-        poses = ray_poses(self.forward() if frame is None else frame)
-        options: dict[str, Any] = {"geomgroup": geomgroup, "flg_static": flg_static, "bodyexclude": bodyexclude}
-        return self._ray_scene.cast(poses, pnt, vec, threads=self.threads, **options)

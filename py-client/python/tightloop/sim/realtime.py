@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from tightloop import _core
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
@@ -150,27 +149,3 @@ def read_timing(text: str) -> Timing:
     said: dict[str, Any] = json.loads(text)
     said |= {name: Percentiles(**said[name]) for name in ("period", "lateness", "latency", "busy")}
     return Timing(**said)
-
-
-@checked_calls
-class HasTiming:
-    """A simulation whose daemon measures how its frames come."""
-
-    _client: _core.Client
-
-    @property
-    def timing(self) -> Timing:
-        """How frames came since the launch, or since `restart_timing`.
-
-        Raises:
-            DaemonLost: The daemon ended.
-        """
-        return read_timing(self._client.timing(False))
-
-    def restart_timing(self) -> Timing:
-        """Return `timing`, and count anew.
-
-        Raises:
-            DaemonLost: The daemon ended.
-        """
-        return read_timing(self._client.timing(True))

@@ -6,43 +6,48 @@ import functools
 import json
 import os
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tightloop import _core
+from tightloop import _core, notebook
 from tightloop._core import Frame
+from tightloop.arrays.frames import FrameCopy
 from tightloop.arrays.inputs import as_mask, as_seed
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import Attributes, ByName, nearest
 from tightloop.checks.params_advice import ParamsAdvice
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, CommandRefused, SimClosed, UnknownAttribute
-from tightloop.gpu.card import KeepsOnGpu
+from tightloop.gpu import card
+from tightloop.gpu.card import Card
 from tightloop.mujoco import keyframes
-from tightloop.notebook import Shown
+from tightloop.planning import plans, rollouts
 from tightloop.planning.dynamics import Dynamics
 from tightloop.planning.ik_objectives import Posture, Reach
 from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.planning.inverse_kinematics import IkSolver
-from tightloop.planning.plans import Plans
+from tightloop.planning.rollouts import Rollout
 from tightloop.scene.sensors import slices_by_name
 from tightloop.sim.command_arrays import Command, ready_arrays, step_arguments
 from tightloop.sim.companions import Companion, end
 from tightloop.sim.daemon import Daemon
 from tightloop.sim.params import Params
-from tightloop.sim.rays import CastsRays
-from tightloop.sim.realtime import HasTiming
+from tightloop.sim.rays import RayHits, Rays, ray_poses
+from tightloop.sim.realtime import Timing, read_timing
 from tightloop.sim.recorder_process import Recording
 from tightloop.sim.snapshot import Snapshot, transfer_file
 from tightloop.sim.viewer_process import Viewer
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 
 @checked_calls
-class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
+class Sim(Attributes):
     """A simulation in a daemon. `launch` and `attach` make it; ``close`` or the end of a ``with`` block closes it.
 
     Attributes:
@@ -76,6 +81,8 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             them from the GPU.
             ``groups`` is the number of groups, ``group`` this one's index, ``first_world`` that of its first world.
     """
+
+    _card: Card | None = None
 
     def __init__(self, client: _core.Client, daemon: Daemon | None) -> None:
         self._client = client
@@ -399,6 +406,75 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
         with transfer_file(self.pid, snapshot.to_bytes()) as path:
             return self._client.restore(path, mask, from_world)
 
+    def copy_from(
+        self, source: Sim | Snapshot | Frame | FrameCopy, world: int = 0, *, mask: ArrayLike | None = None
+    ) -> Frame:
+        """Copy one world of another simulation into worlds of this one, such as the robot's into those of a planner.
+
+        The simulations may belong to different daemons, and to different processes by `attach`. Both must have the same
+        scene, precision and varying parameters. The copy has the state, commands, parameters, seed, episode, ``step``
+        and ``status``. Draws of noise differ between the worlds, since they depend on the world's index.
+
+        Args:
+            source: The other simulation. This client must control it, since the copy takes a snapshot. To copy from a
+                simulation that another client controls, give the observer's frame of its `Sim.latest`. A `Snapshot`
+                is valid too.
+            world: Index of the world in ``source``.
+            mask: Worlds of this simulation that get the copy, bool, shape ``(worlds,)``; all if left out.
+
+        Returns:
+            A frame at the copied state.
+
+        Raises:
+            ArgumentError: ``source`` is none of these, or has no such world.
+            SnapshotError: The simulations differ in scene, precision or varying parameters; no world changed.
+            LeaseHeld: Another client controls one of the simulations.
+            CommandRefused: ``mask`` has a wrong shape or dtype, or a step is in flight. Other errors are those of
+                `step`.
+        """
+        return plans.copy_world(self, source, world, mask)
+
+    def rollout(
+        self,
+        commands: Mapping[str, Any],
+        fields: Sequence[str] | None = None,
+        *,
+        start: Sim | Snapshot | Frame | FrameCopy | tuple[Any, int] | None = None,
+        cost: Callable[[Frame], NDArray[Any]] | None = None,
+        out: Rollout | None = None,
+    ) -> Rollout:
+        """Step through a sequence of commands per world, and collect fields or a cost.
+
+        Each world runs its own sequence. Fields of a frame are copied, and its cost is computed, while the worlds
+        already do the next step. The worlds stay at the end of the rollout. Commands that are left out keep their last
+        value.
+
+        Args:
+            commands: Sequence of each command of `step`, by its name: an array ``(frames, worlds, columns)``, or
+                ``(frames, columns)`` for identical commands, or a dict of such by robot, joint or pattern.
+            fields: Fields to collect; those of the launch if left out, or none if there is a ``cost``.
+            start: What all worlds start from: a simulation or an observer's frame, whose world 0 counts, ``(source,
+                world)`` for another world, or a `Snapshot`. A snapshot with one world counts for all worlds here. If
+                left out, the worlds continue.
+            cost: Function of a frame that returns the cost of each world, ``(worlds,)``. Its sum over the frames is
+                `Rollout.cost`. The function must not call this simulation, and must not keep the frame.
+            out: A rollout with the same worlds, frames and fields, whose arrays are written again. A loop that gives
+                the last result allocates no array.
+
+        Returns:
+            The arrays, and the faults of each world.
+
+        Raises:
+            ArgumentError: An argument is not valid, or ``out`` does not fit.
+            UnknownField: Frames of this run do not carry the field.
+            CommandRefused: A command is not valid; the message names the frame. The worlds stay at the frame before.
+            SnapshotError: ``start`` does not fit; no world changed. Other errors are those of `copy_from` and `step`.
+        """
+        run = rollouts.Run(self, commands, fields, cost, out)
+        if start is not None:
+            plans.begin_rollout(self, start)
+        return run.go()
+
     @property
     def params(self) -> Params:
         """Model parameters that vary between worlds; see `tightloop.sim.params.Params`."""
@@ -445,6 +521,117 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             ArgumentError: An argument is not valid.
         """
         return IkSolver(IkOfDaemon(self._client, self.info), objectives, joints, limits)
+
+    def rays(
+        self,
+        pnt: ArrayLike,
+        vec: ArrayLike,
+        *,
+        geomgroup: ArrayLike | None = None,
+        flg_static: bool = True,
+        bodyexclude: ArrayLike = -1,
+        frame: Frame | FrameCopy | None = None,
+    ) -> RayHits:
+        """Find what rays meet first of the geoms of MuJoCo models, as ``mj_ray`` does, in this process.
+
+        Args:
+            pnt: Origins in the world [m]. It and ``vec`` broadcast to ``(worlds, rays, 3)``: ``(rays, 3)`` counts for
+                all worlds, ``(3,)`` for all rays.
+            vec: Directions; their lengths are the units of the distances.
+            geomgroup: Six flags, which groups of geoms count; all if left out.
+            flg_static: Whether geoms of bodies that are welded to the world count.
+            bodyexclude: Place in `body_names` of a body to pass through, or -1; also one per world or per ray.
+            frame: A frame with ``body_q``, or with ``geom_xpos`` and ``geom_xmat``; that of `forward` if left out.
+
+        Raises:
+            ArgumentError: A shape, dtype or value is wrong, or a geom that counts is an SDF.
+            SceneError: A model's file cannot be read here, or no model of the scene has geoms.
+            UnknownField: The frame has no poses.
+        """
+        poses = ray_poses(self.forward() if frame is None else frame)
+        options: dict[str, Any] = {"geomgroup": geomgroup, "flg_static": flg_static, "bodyexclude": bodyexclude}
+        return self._ray_scene.cast(poses, pnt, vec, threads=self.threads, **options)
+
+    @functools.cached_property
+    def _ray_scene(self) -> Rays:
+        firsts = {name: bodies.start for name, bodies in self.bodies.items()}
+        return Rays(self.info["scene"], self.info["scene_folder"], firsts, len(self.info["body_names"]))
+
+    def keep_on_gpu(self) -> Card:
+        """Keep frames and commands on the GPU, too, until this client gives up control.
+
+        From the next frame on, ``frame.torch("joint_q")`` returns a tensor of torch in the memory that the daemon
+        writes, and ``frame.cuda("joint_q")`` an array for CuPy and JAX. Both are as valid as ``frame.joint_q``: they
+        hold the frame, and stay unchanged until you drop them. Do not write to them. Earlier frames have none. After a
+        call that fails, later frames have none either, until another call succeeds.
+
+        Commands of `step` and `send` may then be arrays on the GPU, shape ``(worlds, columns)`` or ``(columns,)``:
+        all but ``eq_active`` and ``body_f``. Nothing passes through the host; one that the daemon refuses or a recorder
+        wants is read back first. Commands by tensor are not checked for likely mistakes.
+
+        Work is ordered on the current stream of torch, or of CuPy where torch is not installed. If you use several
+        streams, let the current one wait for the others before you drop a tensor or step.
+
+        A frame whose tensors you dropped counts as held until the next command other than `recv`, since queued work may
+        still read it. If JAX or another library had one by DLPack, that command first waits for the whole GPU.
+
+        Returns:
+            The card, with ``device``, the index of the CUDA device, and ``order``: ``"timelines"``, or ``"host: …"``
+            with the reason why each step waits for the stream.
+
+        Raises:
+            GpuMemoryError: The worlds are on the CPU, the driver exports no memory, CUDA does not see that GPU, or the
+                system is not Linux.
+            MissingLibrary: ``cuda-bindings``, or both torch and CuPy, are not installed.
+            LeaseHeld: Another client controls the daemon. Other errors are those of `step`.
+        """
+        library = card.library_for(self.info)
+        self._client.land()  # with a step in flight the request is refused, and the card stays
+        # from here on the daemon may write other memory than an earlier card maps
+        self._card = None
+        self._card = card.open_card(self.info, self._client, library)
+        return self._card
+
+    @property
+    def timing(self) -> Timing:
+        """How frames came since the launch, or since `restart_timing`.
+
+        Raises:
+            DaemonLost: The daemon ended.
+        """
+        return read_timing(self._client.timing(False))
+
+    def restart_timing(self) -> Timing:
+        """Return `timing`, and count anew.
+
+        Raises:
+            DaemonLost: The daemon ended.
+        """
+        return read_timing(self._client.timing(True))
+
+    def picture(
+        self,
+        *,
+        worlds: int | Sequence[int] = 1,
+        camera: Any = None,
+        size: tuple[int, int] = (640, 480),
+        frame: Any = None,
+    ) -> Image:
+        """Return a picture of worlds, which a notebook shows and ``save`` writes.
+
+        Args:
+            worlds: How many worlds are drawn on a grid, the first ones; or a list of them.
+            camera: ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"``, ``"follow"``, or a `tightloop.view.Camera`.
+                If left out, it follows a single world whose robot floats.
+            size: Width and height [pixels].
+            frame: A frame with ``body_q``; that of `forward` if left out.
+
+        Raises:
+            ArgumentError: A world, camera or size does not exist.
+            UnknownField: The frame carries no ``body_q``.
+            MissingLibrary: The extra ``view`` is not installed.
+        """
+        return notebook.simulation_picture(self, worlds=worlds, camera=camera, size=size, frame=frame)
 
     def view(self, *, port: int = 8080, worlds: int = 256, open: bool = False, hosts: Sequence[str] = ()) -> Viewer:
         """Open a browser viewer in a separate process, which ends with the simulation.
@@ -519,6 +706,9 @@ class Sim(KeepsOnGpu, CastsRays, Plans, HasTiming, Shown, Attributes):
             "a Sim cannot be copied or pickled: it holds a connection. Give the other process its name, for "
             f"tightloop.attach({self.name!r}), or make a simulation there"
         )
+
+    def _repr_html_(self) -> str:
+        return notebook.simulation_html(self.name, self.worlds, self.info)
 
     def __enter__(self) -> Sim:
         return self
