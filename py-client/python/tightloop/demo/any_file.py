@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tightloop as tl
-from tightloop.demo.scenes import DemoScene
+from tightloop.demo.scenes import LaunchedScene
 from tightloop.files.scenes import scene_of
 from tightloop.mujoco.model import MujocoModel
 
@@ -19,7 +19,7 @@ _SHARE, _FREE = 0.25, 0.5
 _PERIOD, _SECONDS = 4.0, 6.0
 
 
-class FileScene(DemoScene):
+class FileScene(LaunchedScene):
     """Worlds of a file; each follows a wave of its own phase."""
 
     shown = 16

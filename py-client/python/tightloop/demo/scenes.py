@@ -46,10 +46,9 @@ class DemoScene(ABC):
         self.worlds = worlds
         self.seconds, self.done = 0.0, 0
 
+    @abstractmethod
     def open(self, name: str | None, device: str, threads: int | None) -> None:
         """Launch the simulation; arguments are those of `tightloop.launch`."""
-        options: dict[str, Any] = {"name": name, "device": device, "threads": threads, "params": self.params}
-        self.sim = tl.launch(self.scene(), worlds=self.worlds, fields=("joint_q",), **options)
 
     def close(self) -> None:
         """End the simulation."""
@@ -80,10 +79,6 @@ class DemoScene(ABC):
         return {}
 
     @abstractmethod
-    def scene(self) -> tl.Scene:
-        """Return the scene to simulate."""
-
-    @abstractmethod
     def restart(self) -> None:
         """Reset all worlds."""
 
@@ -96,7 +91,19 @@ class DemoScene(ABC):
         """Summarize the results so far."""
 
 
-class _Recorded(DemoScene):
+class LaunchedScene(DemoScene):
+    """A scene of the demo that runs a `tightloop.Scene`."""
+
+    def open(self, name: str | None, device: str, threads: int | None) -> None:
+        options: dict[str, Any] = {"name": name, "device": device, "threads": threads, "params": self.params}
+        self.sim = tl.launch(self.scene(), worlds=self.worlds, fields=("joint_q",), **options)
+
+    @abstractmethod
+    def scene(self) -> tl.Scene:
+        """Return the scene to simulate."""
+
+
+class _Recorded(LaunchedScene):
     """A scene whose world 0 repeats a recorded run of MuJoCo."""
 
     until = lesson.FRAMES
@@ -194,7 +201,7 @@ class Grasp(_Recorded):
         )
 
 
-class Many(DemoScene):
+class Many(LaunchedScene):
     """Thousands of worlds in one daemon."""
 
     name = "worlds"
@@ -241,9 +248,6 @@ class Trained(DemoScene):
 
     def close(self) -> None:
         self._env.close()
-
-    def scene(self) -> tl.Scene:
-        raise NotImplementedError("the environment has it")
 
     def restart(self) -> None:
         self._obs, _ = self._env.reset(seed=0)
