@@ -167,7 +167,7 @@ def test_a_save_on_a_full_disk_leaves_what_was_there(
     saves = {
         "scene": f"tl.Scene.load({str(tmp_path / 'start.toml')!r}).save(out)",
         "snapshot": f"tl.Snapshot.load({str(tmp_path / 'start')!r}).save(out)",
-        "model": f"from tightloop.precompiled import export; export.export({str(tmp_path / 'model.xml')!r}, out)",
+        "model": f"from tightloop.mujoco import export; export.export({str(tmp_path / 'model.xml')!r}, out)",
     }
     folder = tmp_path / "kept"
     folder.mkdir()

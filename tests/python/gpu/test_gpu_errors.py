@@ -1,6 +1,7 @@
 """A GPU that is not there, or cannot do what is asked: a message with the cure, exit codes as of other errors.
 
-One that is lost in the midst of a run is lost in `sim-daemon/src/serve/server/tests.rs`: no driver loses one when asked to.
+One that is lost in the midst of a run is lost in `sim-daemon/src/serve/server/tests.rs`: no driver loses one when asked
+to.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from typing import Any
 
 import mujoco
 
-from tightloop.precompiled import export
+from tightloop.mujoco import export
 
 #: Parts of `MjModel` that are not read: reason, then names or patterns.
 MODEL = {

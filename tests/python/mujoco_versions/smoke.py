@@ -22,7 +22,7 @@ from models import MODELS, REFUSED, Model
 from numpy.typing import NDArray
 
 import tightloop as tl
-from tightloop.precompiled import Batch
+from tightloop.mujoco import Batch
 
 Array = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ def steps(name: str, case: Model, folder: Path) -> str:
                 worst = max(worst, error)
     assert (contacts > 0) == name.startswith("heap"), f"{contacts} contacts"
     np.savez(folder / f"{name}.npz", **{f"ours.{field}": np.array(all_) for field, all_ in ours.items()})
-    np.savez(folder / f"{name}.precompiled.npz", **{field: np.array(all_) for field, all_ in theirs.items()})
+    np.savez(folder / f"{name}.mujoco.npz", **{field: np.array(all_) for field, all_ in theirs.items()})
     (folder / f"{name}.json").write_text(json.dumps({"model_hash": identity}))
     assert_same(name, model, folder, "the saved scene")
     return f"differs by {worst:.0e}, as noted" if differs else f"within {worst:.0e}"
@@ -149,7 +149,7 @@ def difference(name: str, case: Model, folder: Path, other: Path) -> str:
     for home in homes:
         assert (home / f"{name}.json").exists(), f"there are no results of {name} with {home.name}"
     assert_same(name, model, other, f"the file of {name}")
-    ours, theirs = ([np.load(home / f"{name}{end}") for home in homes] for end in (".npz", ".precompiled.npz"))
+    ours, theirs = ([np.load(home / f"{name}{end}") for home in homes] for end in (".npz", ".mujoco.npz"))
     between, apart = (max(off(one[field], two[field]) for field in one.files) for one, two in (ours, theirs))
     hashes = [json.loads((home / f"{name}.json").read_text())["model_hash"] for home in homes]
     if hashes[0] == hashes[1]:
@@ -161,7 +161,7 @@ def difference(name: str, case: Model, folder: Path, other: Path) -> str:
 
 
 def batch(case: Model) -> str:
-    """Use `tightloop.precompiled.Batch` beside an `MjData` per simulation."""
+    """Use `tightloop.mujoco.Batch` beside an `MjData` per simulation."""
     model = mujoco.MjModel.from_xml_string(case.xml)
     count, worst = 4, 0.0
     with Batch(model, count, precision="f64", forward=True) as sims:

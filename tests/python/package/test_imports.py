@@ -39,16 +39,16 @@ LAYERS = (
         "tightloop.whole_files",
     ),
     ("tightloop._core",),
-    ("tightloop.precompiled", "tightloop.checks.params_advice"),
+    ("tightloop.mujoco", "tightloop.checks.params_advice"),
     # what a scene is made of
-    ("tightloop.scene", "tightloop.precompiled.model", "tightloop.precompiled.scene_models"),
+    ("tightloop.scene", "tightloop.mujoco.model", "tightloop.mujoco.scene_models"),
     ("tightloop.scene.scene", "tightloop.terrain"),
     # what a running simulation is made of
     ("tightloop.planning", "tightloop.sim"),
     ("tightloop.sim.sim", "tightloop.sim.groups"),
     ("tightloop.sim.launching",),
     ("tightloop.planning.linearization",),
-    ("tightloop.precompiled.batch",),
+    ("tightloop.mujoco.batch",),
     # the names for users, `import tightloop as tl`
     ("tightloop",),
     ("tightloop.view",),

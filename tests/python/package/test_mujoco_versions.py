@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from conftest import REPOSITORY
-from tightloop.precompiled import export
+from tightloop.mujoco import export
 
 sys.path.insert(0, str(REPOSITORY / "tests/python/mujoco_versions"))
 import smoke

@@ -57,7 +57,7 @@ def values(sim, row: CommandRow, seed: int):
 @pytest.mark.parametrize("call", [tl.Sim.step, tl.Sim.send])
 def test_a_step_takes_the_commands_of_the_table_in_its_order(call):
     assert [*inspect.signature(call).parameters][1:] == [*COMMANDS]
-    documented = re.findall(r"^ {4}(\w+): ", inspect.getdoc(call), re.MULTILINE)
+    documented = re.findall(r"^ {4}(\w+): ", inspect.getdoc(call) or "", re.MULTILINE)
     assert [name for name in documented if name in COMMANDS] == [*COMMANDS]
 
 

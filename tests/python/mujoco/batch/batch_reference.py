@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.precompiled import Batch
+from tightloop.mujoco import Batch
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""`tightloop.precompiled.Batch` against MuJoCo: steps, writes, subsets, resets and the rows of the state."""
+"""`tightloop.mujoco.Batch` against MuJoCo: steps, writes, subsets, resets and the rows of the state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from batch_reference import FIELDS, STATE, Lockstep, N, difference, model_of, positions
 
 import tightloop as tl
-from tightloop.precompiled import Batch
+from tightloop.mujoco import Batch
 
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 

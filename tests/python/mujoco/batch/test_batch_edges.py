@@ -1,4 +1,4 @@
-"""`tightloop.precompiled.Batch` at its edges: clocks of single simulations, values and arguments that are refused."""
+"""`tightloop.mujoco.Batch` at its edges: clocks of single simulations, values and arguments that are refused."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from batch_reference import XML, N, model_of, positions
 
-from tightloop.precompiled import Batch
-from tightloop.precompiled.batch import engine
+from tightloop.mujoco import Batch
+from tightloop.mujoco.batch import engine
 
 CLOCKS = """
 <mujoco>

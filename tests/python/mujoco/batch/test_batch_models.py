@@ -1,4 +1,4 @@
-"""`tightloop.precompiled.Batch`: names of fields, model fields per simulation, queries and snapshots."""
+"""`tightloop.mujoco.Batch`: names of fields, model fields per simulation, queries and snapshots."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from batch_reference import FIELDS, XML, Lockstep, N, model_of, positions, separate
 
-from tightloop.precompiled import Batch
+from tightloop.mujoco import Batch
 
 
 def test_every_bound_field_has_the_shape_and_dtype_of_mjdata() -> None:

@@ -13,7 +13,7 @@ from safetensors.numpy import load_file, save_file
 
 import tightloop as tl
 from tightloop import optional_imports
-from tightloop.precompiled import textures
+from tightloop.mujoco import textures
 from tightloop.view import Camera, Picture
 from tightloop.view.meshes import paint
 from tightloop.view.parts import Parts, parts

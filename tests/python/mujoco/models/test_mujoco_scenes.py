@@ -12,7 +12,7 @@ import pytest
 
 import tightloop as tl
 from tightloop import optional_imports
-from tightloop.precompiled import export
+from tightloop.mujoco import export
 
 CART = """<mujoco model="cart"><option timestep="0.005" iterations="30"/><worldbody>
 <geom type="plane" size="5 5 .1" pos="0 0 -2"/>
