@@ -6,7 +6,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,8 +59,8 @@ def read_file(file: Path, name: str, *, pos: Vector, quat: Vector, mesh_max_hull
     )
 
 
-def check_options(model: MujocoModel, scene: dict[str, Any]) -> None:
-    """Refuse a model whose options contradict the scene's; ``scene`` has its integrator if another model set it.
+def check_options(model: MujocoModel, scene: dict[str, Any], others: Mapping[str, MujocoModel]) -> None:
+    """Refuse a model whose options contradict the scene's, or whose integrator is not that of other models.
 
     Raises:
         SceneError: The option, and both values.
@@ -68,8 +68,7 @@ def check_options(model: MujocoModel, scene: dict[str, Any]) -> None:
     own = model.options
     pairs = [("dt", own["dt"], scene["dt"]), ("gravity", list(own["gravity"]), list(scene["gravity"]))]
     pairs += [(f"solver {option}", value, scene["solver"][option]) for option, value in own["solver"].items()]
-    if "integrator" in scene:
-        pairs.append(("integrator", own["integrator"], scene["integrator"]))
+    pairs += [("integrator", own["integrator"], other.options["integrator"]) for other in others.values()]
     for option, value, other in pairs:
         if value != other:
             raise SceneError(

@@ -24,7 +24,7 @@ from tightloop.scene.sensors import ContactSensor, HeightScan, Site
 RAYS_MAX = 1000
 
 
-def site(
+def add_site(
     scene: Parts,
     *,
     name: str | None,
@@ -34,14 +34,14 @@ def site(
     relative_to: Site | Body | Link | str | None,
     damping: float,
 ) -> Site:
-    """Make a site for a scene; the other arguments are those of `Scene.add_site`.
+    """Add a site to a scene; the other arguments are those of `Scene.add_site`.
 
     Raises:
         SceneError: A value is out of range, or the body, link or site does not exist.
     """
     name = checks.name("site", free_name("site", scene.sites) if name is None else name, [*scene.sites])
     what = f"site `{name}`"
-    return Site(
+    added = scene.sites[name] = Site(
         name=name,
         body=None if body is None else carrier_name(scene, what, body),
         pos=checks.triple(f"{what}: pos", pos),
@@ -49,10 +49,11 @@ def site(
         relative_to=None if relative_to is None else frame_name(scene, what, relative_to),
         damping=checks.number(f"{what}: damping", damping, above=0.0),
     )
+    return added
 
 
-def contact_sensor(scene: Parts, name: str | None, of: Collidable, against: Collidable | None) -> ContactSensor:
-    """Make a contact sensor for a scene; the other arguments are those of `Scene.add_contact_sensor`.
+def add_contact_sensor(scene: Parts, name: str | None, of: Collidable, against: Collidable | None) -> ContactSensor:
+    """Add a contact sensor to a scene; the other arguments are those of `Scene.add_contact_sensor`.
 
     Raises:
         SceneError: A shape, robot, body or link does not exist in the scene.
@@ -60,14 +61,15 @@ def contact_sensor(scene: Parts, name: str | None, of: Collidable, against: Coll
     taken = scene.contact_sensors
     name = checks.name("contact sensor", free_name("contact", taken) if name is None else name, [*taken])
     what = f"contact sensor `{name}`"
-    return ContactSensor(
+    added = scene.contact_sensors[name] = ContactSensor(
         name=name,
         of=collidable_name(scene, f"{what}: of", of),
         against=None if against is None else collidable_name(scene, f"{what}: against", against),
     )
+    return added
 
 
-def height_scan(
+def add_height_scan(
     scene: Parts,
     *,
     name: str | None,
@@ -77,7 +79,7 @@ def height_scan(
     shape: tuple[int, int],
     reach: float,
 ) -> HeightScan:
-    """Make a height scan for a scene; the other arguments are those of `Scene.add_height_scan`.
+    """Add a height scan to a scene; the other arguments are those of `Scene.add_height_scan`.
 
     Raises:
         SceneError: A value is out of range, or the body does not exist.
@@ -92,7 +94,7 @@ def height_scan(
     counts = tuple(checks.integer(f"{what}: shape", count) for count in shape)
     if max(counts) > RAYS_MAX:
         raise SceneError(f"{what}: shape is {shape!r}; give at most {RAYS_MAX} rays along each axis")
-    return HeightScan(
+    added = scene.height_scans[name] = HeightScan(
         name=name,
         body=None if body is None else bearer_name(scene, what, body),
         pos=checks.triple(f"{what}: pos", pos),
@@ -105,3 +107,4 @@ def height_scan(
         reach=checks.number(f"{what}: reach", reach, above=0.0),
         first=sum(other.counts[0] * other.counts[1] for other in taken.values()),
     )
+    return added

@@ -25,12 +25,12 @@ def shape(
     scene: Parts,
     kind: ShapeType,
     name: str,
-    *,
     body: Body | Link | str | None,
     density: float | None,
+    *,
     surface: Surface,
-    checked_sizes: dict[str, Any],
-    frame_and_sizes: dict[str, Any],
+    checked_sizes: dict[str, Any] | None = None,
+    **frame_and_sizes: Any,
 ) -> Shape:
     """Make a shape for a scene.
 
@@ -55,7 +55,7 @@ def shape(
         if "/" in carrier:
             raise SceneError(f"{what}: link `{carrier}` has the mass that its robot's file gives it; leave out density")
         density = checks.number(f"{what}: density", density, above=0.0)
-    values = checked(what, **frame_and_sizes) | checked_surface(what, surface) | checked_sizes
+    values = checked(what, **frame_and_sizes) | checked_surface(what, surface) | (checked_sizes or {})
     return Shape(name, kind, body=carrier, density=density, **values)
 
 

@@ -36,6 +36,15 @@ def part_names(scene: Parts) -> Collection[str]:
     return cast("Collection[str]", ChainMap[str, Any](scene.shapes, scene.bodies, scene.models, scene.robots))
 
 
+def summary(scene: Parts) -> list[tuple[str, str, str]]:
+    """Return kind, name and one property of each part, for people."""
+    rows = [("robot", name, f"{robot.dofs} dofs") for name, robot in scene.robots.items()]
+    rows += [("MuJoCo model", name, f"{len(model.dof_names)} dofs") for name, model in scene.models.items()]
+    rows += [("body", name, "fixed" if body.fixed else "free") for name, body in scene.bodies.items()]
+    rows += [("shape", shape.full_name, shape.type) for shape in scene.shapes.values()]
+    return rows
+
+
 def carrier_name(scene: Parts, what: str, body: Body | Link | str) -> str:
     """Return the name of a body of this scene, or ``robot/link``."""
     if isinstance(body, Body) and scene.bodies.get(body.name) is not body:

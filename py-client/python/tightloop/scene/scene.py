@@ -18,21 +18,17 @@ from tightloop.checks.arguments import Triple, Vector
 from tightloop.checks.attributes import Attributes, ByName
 from tightloop.checks.running import Running
 from tightloop.checks.signatures import checked_calls
-from tightloop.errors import SceneError
-from tightloop.files.kinds import instead, not_a_scene_ending
-from tightloop.mujoco import mjcf
 from tightloop.mujoco.model import MujocoModel
-from tightloop.mujoco.scene_models import HULL_VERTICES, check_options, read_file, read_model
+from tightloop.mujoco.scene_models import HULL_VERTICES, check_options, read_model
 from tightloop.scene import make_sensors, make_shapes, options, randomization, scene_file, urdf
 from tightloop.scene.body import Body
 from tightloop.scene.entity import Entity
 from tightloop.scene.options import Cone, FrictionCombine, Options
-from tightloop.scene.parts import Collidable, FreeNames, collidable_name, part_names
+from tightloop.scene.parts import Collidable, FreeNames, collidable_name, part_names, summary
 from tightloop.scene.randomization import BodyOffsets, Offsets, ParamRanges
 from tightloop.scene.robot import Link, Robot
 from tightloop.scene.sensors import ContactSensor, HeightScan, Site
 from tightloop.scene.shapes import ORIGIN, UPRIGHT, Shape, ShapeType, Surface, checked_surface, with_surface
-from tightloop.whole_files import whole_file
 
 if TYPE_CHECKING:
     # typing has it from Python 3.11 on, the package runs on 3.10
@@ -67,19 +63,9 @@ class Scene(Attributes):
     """
 
     __slots__ = (
-        "_distributions",
-        "_free_names",
-        "_options",
-        "_running",
-        "bodies",
-        "contact_sensors",
-        "filters",
-        "height_scans",
-        "models",
-        "robots",
-        "shapes",
-        "sites",
-    )
+        "_distributions", "_free_names", "_options", "_running",
+        "bodies", "contact_sensors", "filters", "height_scans", "models", "robots", "shapes", "sites",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -157,9 +143,8 @@ class Scene(Attributes):
 
     @command_delay_max.setter
     def command_delay_max(self, command_delay_max: SupportsIndex | None) -> None:
-        self._options = replace(
-            self._options, command_delay_max=options.checked_command_delay_max(command_delay_max, self.substeps)
-        )
+        checked = options.checked_command_delay_max(command_delay_max, self.substeps)
+        self._options = replace(self._options, command_delay_max=checked)
 
     @property
     def contacts_max(self) -> int | None:
@@ -264,20 +249,11 @@ class Scene(Attributes):
             SceneError: An argument is not valid; the message names it.
         """
         robot, warnings = urdf.read_robot(
-            path,
-            name,
-            taken=part_names(self),
-            pos=pos,
-            quat=quat,
-            floating=floating,
-            self_collisions=self_collisions,
-            strict=strict,
-            mesh_max_hull_vertices=mesh_max_hull_vertices,
-            convex_decomposition=convex_decomposition,
-            collada_up_axis=collada_up_axis,
-            package_dirs=package_dirs,
+            path, name, taken=part_names(self), pos=pos, quat=quat, floating=floating,
+            self_collisions=self_collisions, strict=strict, mesh_max_hull_vertices=mesh_max_hull_vertices,
+            convex_decomposition=convex_decomposition, collada_up_axis=collada_up_axis, package_dirs=package_dirs,
             surface=surface,
-        )
+        )  # fmt: skip
         self._add(self.robots, robot, "add_urdf")
         for warning in warnings:
             advice.warn(f"robot `{robot.name}`: {warning}")
@@ -285,12 +261,7 @@ class Scene(Attributes):
 
     @classmethod
     def from_mujoco(
-        cls,
-        model: Model,
-        *,
-        name: str | None = None,
-        substeps: int = 1,
-        mesh_max_hull_vertices: int = HULL_VERTICES,
+        cls, model: Model, *, name: str | None = None, substeps: int = 1, mesh_max_hull_vertices: int = HULL_VERTICES
     ) -> Scene:
         """Make a scene of a MuJoCo model, with its time step, gravity and solver options.
 
@@ -350,10 +321,7 @@ class Scene(Attributes):
         read = read_model(
             model, name, part_names(self), pos=pos, quat=quat, mesh_max_hull_vertices=mesh_max_hull_vertices
         )
-        own = {"dt": self.dt, "gravity": self.gravity, "solver": asdict(self._options.solver)}
-        for model_before in self.models.values():
-            own["integrator"] = model_before.options["integrator"]
-        check_options(read, own)
+        check_options(read, asdict(self._options), self.models)
         return self._add(self.models, read, "add_mujoco")
 
     def add_body(
@@ -554,12 +522,7 @@ class Scene(Attributes):
 
     @with_surface
     def add_plane(
-        self,
-        *,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        name: str | None = None,
-        **surface: Unpack[Surface],
+        self, *, pos: Vector = ORIGIN, quat: Vector = UPRIGHT, name: str | None = None, **surface: Unpack[Surface]
     ) -> Shape:
         """Add an infinite plane, such as a slope; all below z = 0 of its frame is solid.
 
@@ -663,18 +626,12 @@ class Scene(Attributes):
         Raises:
             SceneError: A value is out of range, or the body, link or site does not exist; the message names it.
         """
-        site = make_sensors.site(
+        return make_sensors.add_site(
             self, name=name, body=body, pos=pos, quat=quat, relative_to=relative_to, damping=damping
         )
-        self.sites[site.name] = site
-        return site
 
     def add_contact_sensor(
-        self,
-        *,
-        of: Collidable,
-        against: Collidable | None = None,
-        name: str | None = None,
+        self, *, of: Collidable, against: Collidable | None = None, name: str | None = None
     ) -> ContactSensor:
         """Add a contact sensor: the sum of the contact forces on shapes, from all others or from some.
 
@@ -692,9 +649,7 @@ class Scene(Attributes):
         Raises:
             SceneError: A shape, robot, body or link does not exist in the scene; the message names it.
         """
-        sensor = make_sensors.contact_sensor(self, name, of, against)
-        self.contact_sensors[sensor.name] = sensor
-        return sensor
+        return make_sensors.add_contact_sensor(self, name, of, against)
 
     def add_height_scan(
         self,
@@ -727,9 +682,7 @@ class Scene(Attributes):
         Raises:
             SceneError: A value is out of range, or the body does not exist; the message names it.
         """
-        scan = make_sensors.height_scan(self, name=name, body=body, pos=pos, size=size, shape=shape, reach=reach)
-        self.height_scans[scan.name] = scan
-        return scan
+        return make_sensors.add_height_scan(self, name=name, body=body, pos=pos, size=size, shape=shape, reach=reach)
 
     def randomize(
         self,
@@ -800,11 +753,7 @@ class Scene(Attributes):
         Raises:
             SceneError: The file cannot be written, or its ending is that of another format, such as ``.json``.
         """
-        file = checks.path("save: path", path)
-        if problem := not_a_scene_ending(file):
-            raise SceneError(f"save: {problem}")
-        models, fields = scene_file.keep_beside(file, self)
-        _core.save_scene(scene_file.written(self, self._options, self._distributions, models, fields), str(file))
+        scene_file.save(self, checks.path("save: path", path), self._options, self._distributions)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
@@ -817,10 +766,7 @@ class Scene(Attributes):
             SceneError: The file is missing, or an entry in it is not valid.
             UrdfError: A robot of the scene cannot be read.
         """
-        if wrong := instead("load: path", path, "scene"):
-            raise SceneError(wrong)
-        file = checks.path("load: path", path)
-        return cls._made_of(_core.load_scene(str(file)), file.parent)
+        return cls._made_of(*scene_file.read(path))
 
     @classmethod
     def from_toml(cls, text: str, folder: str | os.PathLike[str] = ".") -> Scene:
@@ -841,16 +787,7 @@ class Scene(Attributes):
         """Make a scene of its tables as JSON, whose paths are relative to a folder."""
         data = json.loads(tables)
         scene = cls(**{option: data[option] for option in options.NAMES if option in data})
-        scene.solver(**data["solver"])
-        for table in data.get("robot", ()):
-            arguments, joints = scene_file.robot_arguments(table, folder)
-            robot = scene.add_urdf(**arguments)
-            for name, values in joints.items():
-                setattr(robot, name, values)
-        for table in data.get("mujoco", ()):
-            scene.models[table["name"]] = read_file(folder / table.pop("model"), **table)
-        for method, arguments in scene_file.calls(data, folder):
-            getattr(scene, method)(**arguments)
+        scene_file.fill(scene, data, folder)
         return scene
 
     def to_toml(self) -> str:
@@ -875,40 +812,13 @@ class Scene(Attributes):
             SceneError: The scene does not compile, or part of it has no equal in MJCF: a MuJoCo model, a drive of a
                 ball joint, damping of a free joint. The message names it. Or the file cannot be written.
         """
-        text = mjcf.written(json.loads(_core.compiled_scene(self.to_toml())), "scene")
-        left = [*self.contact_sensors, *self.height_scans]
-        if left:
-            advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
-        drawn = sorted({*self.params, *self._distributions} & set(_core.param_names()))
-        if drawn:
-            advice.warn(f"to_mujoco: worlds differ in {', '.join(drawn)}; the text has the values of the scene")
-        if path is not None:
-            with whole_file(checks.path("to_mujoco: path", path), SceneError) as file:
-                file.write_text(text, encoding="utf-8")
-        return text
+        return scene_file.to_mujoco(self, {*self.params, *self._distributions}, path)
 
     def _add_shape(
-        self,
-        kind: ShapeType,
-        name: str | None,
-        body: Body | Link | str | None,
-        density: float | None,
-        surface: Surface,
-        *,
-        checked_sizes: dict[str, Any] | None = None,
-        **frame_and_sizes: Any,
+        self, kind: ShapeType, name: str | None, body: Any, density: float | None, surface: Surface, **values: Any
     ) -> Shape:
         name = self._checked_name(kind, name)
-        shape = make_shapes.shape(
-            self,
-            kind,
-            name,
-            body=body,
-            density=density,
-            surface=surface,
-            checked_sizes=checked_sizes or {},
-            frame_and_sizes=frame_and_sizes,
-        )
+        shape = make_shapes.shape(self, kind, name, body, density, surface=surface, **values)
         self.shapes[name] = shape
         self._changed("add_ground" if kind == "plane" else f"add_{kind}")
         return shape
@@ -931,12 +841,8 @@ class Scene(Attributes):
             running.tell("Scene", attribute)
 
     def _repr_html_(self) -> str:
-        rows = [("robot", name, f"{robot.dofs} dofs") for name, robot in self.robots.items()]
-        rows += [("MuJoCo model", name, f"{len(model.dof_names)} dofs") for name, model in self.models.items()]
-        rows += [("body", name, "fixed" if body.fixed else "free") for name, body in self.bodies.items()]
-        rows += [("shape", shape.full_name, shape.type) for shape in self.shapes.values()]
         title = f"Scene: {self.substeps} steps of {self.dt:.6g} s per frame"
-        return notebook.table(title, (), rows, notebook.picture_html("of_scene", self))
+        return notebook.table(title, (), summary(self), notebook.picture_html("of_scene", self))
 
     def __repr__(self) -> str:
         parts = f"robots={[*self.robots]}, models={[*self.models]}, bodies={[*self.bodies]}, shapes={[*self.shapes]}"

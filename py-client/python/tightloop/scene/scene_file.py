@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tightloop.mujoco import scene_models
+from tightloop import _core
+from tightloop.checks import advice
+from tightloop.checks import arguments as checks
+from tightloop.errors import SceneError
+from tightloop.files.kinds import instead, not_a_scene_ending
+from tightloop.mujoco import mjcf, scene_models
 from tightloop.scene import height_fields, randomization
 from tightloop.scene.options import Options
 from tightloop.scene.parts import Parts
 from tightloop.scene.robot import PER_DOF
 from tightloop.scene.sensors import ContactSensor, HeightScan, Site
+from tightloop.whole_files import whole_file
+
+if TYPE_CHECKING:
+    from tightloop.scene.scene import Scene
 
 
 def written(
@@ -51,6 +61,30 @@ def _without_none(sensor: Site | ContactSensor | HeightScan) -> dict[str, Any]:
     return {name: value for name, value in vars(sensor).items() if value is not None}
 
 
+def save(scene: Parts, file: Path, options: Options, distributions: Mapping[str, Any]) -> None:
+    """Write a scene file, with copies of its models and height fields beside it.
+
+    Raises:
+        SceneError: The file has the ending of another kind, or cannot be written.
+    """
+    if problem := not_a_scene_ending(file):
+        raise SceneError(f"save: {problem}")
+    models, fields = keep_beside(file, scene)
+    _core.save_scene(written(scene, options, distributions, models, fields), str(file))
+
+
+def read(path: str | os.PathLike[str]) -> tuple[str, Path]:
+    """Return the tables of a scene file as JSON, and its folder.
+
+    Raises:
+        SceneError: The file has the ending of another kind, or cannot be read.
+    """
+    if wrong := instead("load: path", path, "scene"):
+        raise SceneError(wrong)
+    file = checks.path("load: path", path)
+    return _core.load_scene(str(file)), file.parent
+
+
 def keep_beside(file: Path, scene: Parts) -> tuple[dict[str, Path], dict[str, Path]]:
     """Copy models and height fields of a scene beside its file; return the copies by name."""
     models = {model.name: scene_models.keep_beside(file, model) for model in scene.models.values()}
@@ -60,6 +94,45 @@ def keep_beside(file: Path, scene: Parts) -> tuple[dict[str, Path], dict[str, Pa
         if shape.type == "hfield" and shape.path is not None
     }
     return models, fields
+
+
+def fill(scene: Scene, tables: Mapping[str, Any], folder: Path) -> None:
+    """Add to a scene what the tables of a scene file have; relative paths begin in the folder."""
+    scene.solver(**tables["solver"])
+    for table in tables.get("robot", ()):
+        arguments, joints = robot_arguments(table, folder)
+        robot = scene.add_urdf(**arguments)
+        for name, values in joints.items():
+            setattr(robot, name, values)
+    for table in tables.get("mujoco", ()):
+        others = {name: value for name, value in table.items() if name != "model"}
+        scene.models[table["name"]] = scene_models.read_file(folder / table["model"], **others)
+    for method, arguments in calls(tables, folder):
+        getattr(scene, method)(**arguments)
+
+
+def to_mujoco(scene: Scene, varying: Set[str], path: str | os.PathLike[str] | None) -> str:
+    """Return a scene as MJCF and write it to a file, if one is given; warn of what MJCF lacks.
+
+    Args:
+        scene: The scene.
+        varying: Names of what differs between its worlds.
+        path: The file.
+
+    Raises:
+        SceneError: The file cannot be written.
+    """
+    text = mjcf.written(json.loads(_core.compiled_scene(scene.to_toml())), "scene")
+    left = [*scene.contact_sensors, *scene.height_scans]
+    if left:
+        advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
+    drawn = sorted(varying & set(_core.param_names()))
+    if drawn:
+        advice.warn(f"to_mujoco: worlds differ in {', '.join(drawn)}; the text has the values of the scene")
+    if path is not None:
+        with whole_file(checks.path("to_mujoco: path", path), SceneError) as file:
+            file.write_text(text, encoding="utf-8")
+    return text
 
 
 def robot_arguments(table: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
