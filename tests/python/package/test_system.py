@@ -345,7 +345,7 @@ def test_memory_of_a_gpu_is_refused_before_anything_is_asked_of_the_daemon(pendu
     with tl.launch(pendulum, worlds=1) as sim:
         frame = sim.step()
         with on(platform), pytest.raises(tl.GpuMemoryError, match=r"keep_on_gpu: .*on Linux only.*NumPy"):
-            type(sim).keep_on_gpu(SimpleNamespace())  # type: ignore[arg-type]
+            type(sim).keep_on_gpu(SimpleNamespace(info={}))  # type: ignore[arg-type]
         assert sim.step().step[0] == frame.step[0] + 1
 
 

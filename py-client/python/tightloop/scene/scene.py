@@ -812,7 +812,7 @@ class Scene(Attributes):
             SceneError: The scene does not compile, or part of it has no equal in MJCF: a MuJoCo model, a drive of a
                 ball joint, damping of a free joint. The message names it. Or the file cannot be written.
         """
-        return scene_file.to_mujoco(self, {*self.params, *self._distributions}, path)
+        return scene_file.to_mujoco(self, self.to_toml(), {*self.params, *self._distributions}, path)
 
     def _add_shape(
         self, kind: ShapeType, name: str | None, body: Any, density: float | None, surface: Surface, **values: Any

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,6 @@ from tightloop.scene.parts import Parts
 from tightloop.scene.robot import PER_DOF
 from tightloop.scene.sensors import ContactSensor, HeightScan, Site
 from tightloop.whole_files import whole_file
-
-if TYPE_CHECKING:
-    from tightloop.scene.scene import Scene
 
 
 def written(
@@ -96,8 +93,14 @@ def keep_beside(file: Path, scene: Parts) -> tuple[dict[str, Path], dict[str, Pa
     return models, fields
 
 
-def fill(scene: Scene, tables: Mapping[str, Any], folder: Path) -> None:
-    """Add to a scene what the tables of a scene file have; relative paths begin in the folder."""
+def fill(scene: Any, tables: Mapping[str, Any], folder: Path) -> None:
+    """Add to a scene what a scene file has.
+
+    Args:
+        scene: A `tightloop.Scene`, which is in a layer above.
+        tables: The tables of the file.
+        folder: Folder that relative paths begin in.
+    """
     scene.solver(**tables["solver"])
     for table in tables.get("robot", ()):
         arguments, joints = robot_arguments(table, folder)
@@ -111,18 +114,19 @@ def fill(scene: Scene, tables: Mapping[str, Any], folder: Path) -> None:
         getattr(scene, method)(**arguments)
 
 
-def to_mujoco(scene: Scene, varying: Set[str], path: str | os.PathLike[str] | None) -> str:
+def to_mujoco(scene: Parts, toml: str, varying: Set[str], path: str | os.PathLike[str] | None) -> str:
     """Return a scene as MJCF and write it to a file, if one is given; warn of what MJCF lacks.
 
     Args:
         scene: The scene.
+        toml: Its scene file.
         varying: Names of what differs between its worlds.
         path: The file.
 
     Raises:
         SceneError: The file cannot be written.
     """
-    text = mjcf.written(json.loads(_core.compiled_scene(scene.to_toml())), "scene")
+    text = mjcf.written(json.loads(_core.compiled_scene(toml)), "scene")
     left = [*scene.contact_sensors, *scene.height_scans]
     if left:
         advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
