@@ -89,8 +89,13 @@ impl Client {
     }
 
     /// Names of the arrays that a step, a write or a reset cannot take as they are.
-    fn unready(&self, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
-        self.table.unready(given)
+    fn unready(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
+        let names = self.table.unready(given)?;
+        if !names.is_empty() {
+            // a client that is closed, or another process's, says so before anything is wrong with a value
+            self.connection(py)?;
+        }
+        Ok(names)
     }
 
     /// What the columns of an input are of: names, the number of columns, how many each name has, and the parts of the

@@ -99,6 +99,10 @@ INFO = {
         {"name": "time", "shape": [WORLDS], "dtype": "f64"},
         {"name": "body_q", "shape": [WORLDS, 2, 7], "dtype": "f32"},
     ],
+    "known_fields": [
+        {"name": "joint_f", "axes": "(worlds, dofs)"},
+        {"name": "mocap_pos", "axes": "(worlds, mocaps, 3)"},
+    ],
 }
 THERE = {
     "stride": SLOT,
