@@ -92,7 +92,7 @@ impl Client {
     fn unready(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
         let names = self.table.unready(given)?;
         if !names.is_empty() {
-            // a client that is closed, or another process's, says so before anything is wrong with a value
+            // that the client is closed, or another process's, comes before what is wrong with a value
             self.connection(py)?;
         }
         Ok(names)
