@@ -320,6 +320,14 @@ def test_changes_of_a_scene_that_runs(scene, change, said):
             arm.joint_target_ke = 8.0
 
 
+def test_a_copy_of_a_scene_that_runs_changes_nothing(scene):
+    with tl.launch(scene, worlds=1):
+        with nothing_told():
+            copy.copy(scene)
+        with told_once(r"Scene: `gravity`.*write sim\.params\.gravity"):
+            scene.gravity = (0, 0, -9)
+
+
 def test_only_the_first_calls_and_worlds_are_looked_at(scene):
     late = np.zeros((20, 8))
     late[17, 0] = 90.0

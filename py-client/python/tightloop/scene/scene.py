@@ -62,9 +62,11 @@ class Scene(Attributes):
         SceneError: A value is out of range; the message names it.
     """
 
-    __slots__ = (
-        "_distributions", "_free_names", "_options", "_running",
+    # a copy takes them in this order, and nothing that comes before `_running` warns that a launched scene changes
+    __slots__ = (  # noqa: RUF023
+        "_distributions", "_free_names", "_options",
         "bodies", "contact_sensors", "filters", "height_scans", "models", "robots", "shapes", "sites",
+        "_running",
     )  # fmt: skip
 
     def __init__(

@@ -286,7 +286,7 @@ class Sim(Attributes):
         joint_q: Command | None = None,
         joint_qd: Command | None = None,
         act: ArrayLike | None = None,
-        ctrl: ArrayLike | None = None,
+        ctrl: Command | None = None,
         mocap_pos: ArrayLike | None = None,
         mocap_quat: ArrayLike | None = None,
         eq_active: ArrayLike | None = None,
@@ -305,7 +305,7 @@ class Sim(Attributes):
             act: Activations of the actuators that `activation_names` lists, shape ``(worlds, activations)`` or
                 ``(activations,)``.
             ctrl: Controls, which hold until the next `step` that gives others, shape ``(worlds, actuators)`` or
-                ``(actuators,)``.
+                ``(actuators,)``, or a dict as in `step`.
             mocap_pos: Positions of mocap bodies, likewise.
             mocap_quat: Quaternions of mocap bodies, likewise.
             eq_active: Whether equalities act, likewise.
