@@ -23,14 +23,17 @@ macro_rules! every_stage {
     ($expand:ident $arguments:tt) => {
         $crate::$expand! { $arguments
             command              [forces::command::Commands]                 Once;
+            // where bodies are, how they move, and their inertia in joint space
             kinematics           [tree::kinematics::Kinematics]              Both;
             bias                 [tree::bias::Bias]                          Both;
             mass_matrix          [tree::mass_matrix::MassMatrix]             Both;
+            // forces but those of constraints, summed in `smooth_force`
             actuation            [forces::actuation::Actuation]              Both;
             springs              [forces::springs::Springs]                  Both;
             fluid                [forces::fluid::Fluid]                      Both;
             gravity_compensation [forces::gravity_compensation::GravityCompensation] Both;
             actuators            [forces::actuators::Actuators]              Both;
+            // rows of joints and of ties
             constraint           [constraints::joint_rows::Constraint]       Both;
             ties                 [constraints::ties::Ties]                   Both;
             // contacts: where shapes are, then one stage for each pair of kinds of shapes

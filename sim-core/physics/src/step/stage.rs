@@ -145,6 +145,7 @@ impl StageId {
 
     /// Has the model anything for it to do?
     pub fn is_needed<R: Real>(self, m: &Constants<R>) -> bool {
+        // stages are types without values: a table of their functions, by place in the list
         let needed: [fn(&Constants<R>) -> bool; COUNT] =
             crate::every_stage!(stage_functions(needed, R));
         needed[self.0](m)

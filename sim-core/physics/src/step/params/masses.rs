@@ -25,6 +25,7 @@ pub(in crate::step) fn of_part<F: Num>(
 ) -> (F, [F; 6]) {
     let mass = param(m, params, Param::BodyMass, part.link, part.mass);
     let inertia = match (m.varying.first(Param::BodyInertia), part.link_axes) {
+        // a client gives it in the link's axes: R I Rᵀ turns it into the body's
         (Some(first), Some(axes)) => {
             let own = std::array::from_fn(|i| params[first + 6 * part.link + i]);
             turned(&Mat3::constant(axes), own)
@@ -70,11 +71,13 @@ pub(in crate::step) fn inertia_times<F: Num, V>(
 ) -> Vec3<F> {
     let w: &Workspace<F> = &b.work;
     let own = match m.varying.first(Param::BodyInertia) {
+        // given in the link's axes: R I Rᵀ v
         Some(first) => {
             let turn: Mat3<F> = axes(w, &body.frame);
             let inertia = matrix(std::array::from_fn(|i| b.params[first + 6 * body.link + i]));
             turn.mul_add(inertia * turn.transpose_mul(v), Vec3::zero())
         }
+        // along the principal axes, where I is diagonal
         None => {
             let turn: Mat3<F> = axes(w, &body.inertial);
             let Vec3(along) = turn.transpose_mul(v);
@@ -86,6 +89,7 @@ pub(in crate::step) fn inertia_times<F: Num, V>(
             turn.mul_add(moment, Vec3::zero())
         }
     };
+    // the scale of a mass multiplies its inertia, too
     match scale(m, &b.params, body.link) {
         Some(scale) => own * scale,
         None => own,
@@ -107,5 +111,6 @@ fn turned<F: Num>(rotation: &Mat3<F>, inertia: [F; 6]) -> [F; 6] {
     let x = rotation * (inertia * row(0));
     let y = rotation * (inertia * row(1));
     let z = rotation * (inertia * row(2));
+    // the columns' entries xx yy zz xy xz yz
     [x[0], y[1], z[2], x[1], x[2], y[2]]
 }

@@ -29,6 +29,7 @@ impl Stage for Bias {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        // gravity as an acceleration of the base by -g, which gives every body its weight
         let base = -gravity(m, &b.params);
         // forces at once, so that few accelerations are kept at a time
         for k in 0..m.bodies.len() {
@@ -41,12 +42,15 @@ impl Stage for Bias {
         for (k, body) in m.bodies.iter().enumerate().rev() {
             let force = w.force[k];
             if body.motion == Motion::Free {
+                // S = 1: the force itself, which no carrier bears
                 w.bias_force[body.dofs()].copy_from_slice(&force.scalars());
                 continue;
             }
+            // c(dof) = S · f
             for d in body.dofs() {
                 w.bias_force[d] = along(body.motion, &w.motion[d], force);
             }
+            // f(parent) += f, n(parent) += n + r × f
             if let Some(parent) = body.parent {
                 w.force[parent] = w.force[parent] + force.moved(w.arm[k]);
             }
@@ -87,6 +91,7 @@ fn accelerate<C: Cx>(
     base: Vec3<C::F>,
 ) {
     let body = &m.bodies[k];
+    // v(b) = v(parent) + S q̇, and the acceleration at q̈ = 0. A root's point has that of the base
     let own = joint_velocity(cx, b, body);
     let w = &mut b.work;
     let (velocity, acceleration) = match body.parent {
@@ -110,13 +115,16 @@ fn carried<F: Num>(
     own: Spatial<F>,
     arm: Vec3<F>,
 ) -> Spatial<F> {
+    // a + α × r + ω × (ω × r), with ω and α of the carrier
     let omega = velocity[ANGULAR];
     let point = point_acceleration(carrier, omega, arm);
     match motion {
+        // Coriolis: 2 ω × z q̇ of a point that slides
         Motion::Prismatic => {
             let twice = own[LINEAR] * F::c(2.0);
             Spatial([omega.cross_add(twice, point), carrier[ANGULAR]])
         }
+        // α + ω × S q̇: the carrier turns the joint's axis
         _ => Spatial([point, omega.cross_add(own[ANGULAR], carrier[ANGULAR])]),
     }
 }
@@ -129,6 +137,7 @@ fn joint_velocity<C: Cx>(
     body: &Body<<C::F as Num>::Real>,
 ) -> Spatial<C::F> {
     let qd = &b.joint_qd[body.dofs()];
+    // S = 1: velocity of the centre of mass, and the angular one, in world axes
     if body.motion == Motion::Free {
         let (mut linear, mut angular) = (Vec3::zero(), Vec3::zero());
         for i in 0..3 {
@@ -137,9 +146,11 @@ fn joint_velocity<C: Cx>(
         }
         return Spatial([linear, angular]);
     }
+    // without dofs it has no velocity, as in MuJoCo
     if body.motion == Motion::Mocap {
         return Spatial::zero();
     }
+    // one axis, or the three of a ball in the order of its dofs
     let motion = &b.work.motion[body.dofs()];
     let mut own = motion[0] * cx.get(&qd[0]);
     for d in 1..body.motion.dofs() {

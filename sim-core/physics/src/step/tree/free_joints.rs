@@ -40,6 +40,7 @@ fn of_dofs<F: Num>(
             Param::JointArmature => dof.armature,
             _ => dof.damping,
         };
+        // dofs 0 to 2 are linear, 3 to 5 angular
         both[i / 3][i % 3] = param(m, params, which, first + i, fixed);
     }
     both
@@ -58,6 +59,7 @@ pub(in crate::step) fn subtract<F: Num>(
     rotation: crate::math::vec3::Mat3<F>,
     origin: Vec3<F>,
 ) {
+    // Tᵀ (f, n) = (f, o × f + R n)
     let turn = origin.cross_add(force, rotation * torque);
     for i in 0..3 {
         to[i] = to[i] - force[i];
@@ -86,12 +88,14 @@ pub(in crate::step) fn add_damping_forces<C: Cx>(
     for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
+        // v' = v + ω × o, the velocity of the frame's origin
         let spin = spin(cx, b, first);
         let mut velocity = Vec3::zero();
         for i in 0..3 {
             velocity[i] = cx.get(&b.joint_qd[first + i]);
         }
         let velocity = spin.cross_add(origin, velocity);
+        // D v', the angular part in the body's axes
         let [linear, angular] = of_dofs(m, &b.params, Param::JointDamping, body);
         let force = scaled(linear, velocity);
         let torque = scaled(angular, rotation.transpose_mul(spin));
@@ -111,6 +115,7 @@ pub(in crate::step) fn add_swing_forces<C: Cx>(
     for &body in &m.free_joints {
         let first = m.bodies[body].dof;
         let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
+        // A c with c = (ω × (ω × o), 0): the angular part of armature has no share
         let spin = spin(cx, b, first);
         let swing = spin.cross(spin.cross(origin));
         let [armature, _] = of_dofs(m, &b.params, Param::JointArmature, body);
@@ -119,7 +124,7 @@ pub(in crate::step) fn add_swing_forces<C: Cx>(
     }
 }
 
-/// Adds Tᵀ X T to the mass matrix, X the diagonal of armature or damping, times a factor.
+/// Adds Tᵀ X T to the mass matrix, X a diagonal in MuJoCo's velocities: armature, or h times damping.
 #[inline(always)]
 fn add_block<F: Num>(
     m: &Constants<F::Real>,
@@ -138,7 +143,9 @@ fn add_block<F: Num>(
             angular,
             Vec3([rotation[0][j], rotation[1][j], rotation[2][j]]),
         );
+        // angular rows of this column: o × X (axis × o) + R X Rᵀ axis
         let torque = origin.cross_add(moved, rotation * turned);
+        // linear block X, then the row of dof 3 + j: the matrix keeps its lower triangle
         let own = m.pattern.at(first + j, first + j);
         w.mass_matrix[own] = w.mass_matrix[own] + linear[j];
         for i in 0..3 {
@@ -178,6 +185,7 @@ pub(in crate::step) fn add_armature_forces<C: Cx>(cx: &C, m: &ConstantsOf<C>, b:
         // `inverse_dynamics` has no use of the robot's reference point, and the frame's origin from it
         let rotation = b.work.rotation[body];
         let origin = -(rotation * Vec3::constant(m.bodies[body].center));
+        // A T a, negative because `subtract` adds it then
         let [slide, turn] = of_dofs(m, &b.params, Param::JointArmature, body);
         let force = scaled(slide, angular.cross_add(origin, linear)) * C::F::c(-1.0);
         let torque = scaled(turn, rotation.transpose_mul(angular)) * C::F::c(-1.0);
@@ -192,10 +200,12 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Bl
     let dt = C::F::k(m.dt);
     for &body in &m.free_joints {
         let first = m.bodies[body].dof;
+        // h D, whose Tᵀ D T is no diagonal
         let damping = map(of_dofs(m, &b.params, Param::JointDamping, body), |x| x * dt);
         let spin = spin(cx, b, first);
         let w = &mut b.work;
         let (rotation, origin) = (w.rotation[body], w.origin[body]);
+        // on the left h Tᵀ D T, on the right -h Tᵀ D c
         add_block(m, w, body, damping);
         let force = scaled(damping[0], spin.cross(spin.cross(origin)));
         let to = &mut w.acceleration[first..first + 6];
@@ -212,6 +222,7 @@ pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<
     let zero = C::F::c(0.0);
     // six rows, and the right-hand side
     let mut system = [[zero; 7]; 6];
+    // H is symmetric, and its lower triangle is kept
     for i in 0..6 {
         for j in 0..6 {
             let (row, column) = (first + i.max(j), first + i.min(j));
@@ -219,6 +230,7 @@ pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<
         }
         system[i][6] = w.acceleration[first + i];
     }
+    // h N: the bias force changes with the angular velocity alone, in columns 3 to 5
     for j in 0..3 {
         let mut axis = Vec3::zero();
         axis[j] = C::F::c(1.0);
@@ -228,6 +240,7 @@ pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<
             system[3 + i][3 + j] = dt.fma(torque[i], system[3 + i][3 + j]);
         }
     }
+    // Gauss' elimination, then back substitution from the last row
     let found = &mut w.minimum[first..first + 6];
     eliminate(&mut system);
     for i in (0..6).rev() {
@@ -248,9 +261,13 @@ fn bias_change<F: Num>(
     turn: Vec3<F>,
 ) -> [Vec3<F>; 2] {
     let moment = inertia.first_moment();
+    // r, from the frame's origin to the centre of mass, and p the first moment about the reference point
     let arm = -origin;
+    // S(α) = α × (ω × r) + ω × (α × r)
     let swing = turn.cross_add(spin.cross(arm), spin.cross(turn.cross(arm)));
+    // α × (ω × p) + ω × (α × p)
     let pull = turn.cross_add(spin.cross(moment), spin.cross(turn.cross(moment)));
+    // α × I ω + ω × I α
     let gyration = spin.cross(inertia.second_moment(turn));
     let gyration = turn.cross_add(inertia.second_moment(spin), gyration);
     [
@@ -263,10 +280,12 @@ fn bias_change<F: Num>(
 #[inline(always)]
 fn eliminate<F: Num>(system: &mut [[F; 7]; 6]) {
     for p in 0..6 {
+        // row -= row(p) / pivot × row p of the system
         let pivot = system[p];
         let inverse = F::c(1.0).div(pivot[p]);
         for row in &mut system[p + 1..] {
             let factor = row[p] * inverse;
+            // column p stays as it is below the pivot: nothing reads it again
             for (x, above) in row.iter_mut().zip(pivot).skip(p + 1) {
                 *x = factor.fnma(above, *x);
             }

@@ -18,10 +18,12 @@ use crate::step::{BlockOf, ConstantsOf};
 /// Writes the velocities, `(dofs,)`.
 #[inline(always)]
 pub fn velocities<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    // other joints have MuJoCo's velocities
     for (x, cell) in to.iter_mut().zip(&b.joint_qd) {
         *x = cx.get(cell);
     }
     for (k, dof) in free_bodies(m) {
+        // v' = v - ω × r and ω' = Rᵀ ω
         let [linear, angular] = halves(&to[dof..]);
         // the reference point is the centre of mass, so the origin is -r
         let linear = angular.cross_add(b.work.origin[k], linear);
@@ -58,6 +60,7 @@ pub fn keep_accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf
 pub fn take_accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for (k, dof) in free_bodies(m) {
         let [linear, angular, spin] = motion_of(cx, b, dof);
+        // α = R α' and a = a' - α × o - ω × (ω × o), with the frame's origin o = -r
         let origin = b.work.origin[k];
         let angular = b.work.rotation[k] * angular;
         let swing = spin.cross(spin.cross(origin)) + angular.cross(origin);
@@ -83,6 +86,7 @@ fn accelerations_of<C: Cx>(
     dof: usize,
 ) -> (Vec3<C::F>, Vec3<C::F>) {
     let [linear, angular, spin] = motion_of(cx, b, dof);
+    // a' = a + α × o + ω × (ω × o) with the frame's origin o = -r, and α' = Rᵀ α
     let origin = b.work.origin[body];
     let swing = spin.cross_add(spin.cross(origin), linear);
     let linear = angular.cross_add(origin, swing);
@@ -107,6 +111,7 @@ fn set_accelerations<C: Cx>(
 #[inline(always)]
 pub fn turn_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, forces: &mut [F]) {
     for (k, dof) in free_bodies(m) {
+        // τ' = Rᵀ (τ + r × f), about the frame's origin in the body's axes
         let [force, torque] = halves(&forces[dof..]);
         // the reference point is the centre of mass, so the origin is -r
         let moved = torque - w.origin[k].cross(force);
@@ -120,9 +125,11 @@ pub fn turn_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, forces: &mu
 pub fn bias<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
     let w = &b.work;
     to.copy_from_slice(&w.bias_force);
+    // c + M s with s = ω × (ω × r), the acceleration a at a' = 0
     for (k, dof) in free_bodies(m) {
         let spin = Vec3(std::array::from_fn(|i| cx.get(&b.joint_qd[dof + 3 + i])));
         let swing = spin.cross(w.origin[k].cross(spin));
+        // M s by the columns of the linear dofs, where entries that the pattern lacks are 0
         for (row, force) in to.iter_mut().enumerate() {
             for i in 0..3 {
                 if let Some(place) = m.pattern.find(row, dof + i) {
@@ -133,6 +140,7 @@ pub fn bias<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) 
     }
     // MuJoCo's have no armature
     free_joints::add_swing_forces(cx, m, b, -1.0, to);
+    // torques about the frame's origin, in the body's axes
     turn_forces(m, w, to);
 }
 

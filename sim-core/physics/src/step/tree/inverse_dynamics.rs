@@ -22,11 +22,13 @@ use crate::step::{BlockOf, ConstantsOf, gravity, masses, param};
 pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     // `force` holds the acceleration of a body's origin until its force is known
     proper_accelerations(cx, m, b);
+    // F and N of each body, sums over its links where masses vary
     for (k, body) in m.bodies.iter().enumerate() {
         let w = &mut b.work;
         let (axes, omega) = (&w.rotation[k], w.velocity[k][ANGULAR]);
         let state = (axes, omega, w.force[k]);
         w.force[k] = if masses::vary(m) {
+            // F and N are linear in mass and inertia, so a link's scale multiplies both
             let mut whole = Spatial::zero();
             for part in &body.parts {
                 let massed = masses::of_part(m, &b.params, part);
@@ -40,6 +42,7 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
             newton_euler::<C::F>(massed, body.center, state)
         };
     }
+    // from the leaves: τ = z · n or z · f, then the force goes on to the carrier
     for (k, body) in m.bodies.iter().enumerate().rev() {
         // what body and subtree need, about the origin of the body
         let arm = arm(cx, b, k, body);
@@ -59,6 +62,7 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
             }
             Motion::Mocap => {}
         }
+        // f(parent) += f, n(parent) += n + r × f
         if let Some(parent) = body.parent {
             let carried = w.force[k].moved(arm);
             w.force[parent] = w.force[parent] + carried;
@@ -79,35 +83,42 @@ pub(in crate::step) fn proper_accelerations<C: Cx>(
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
 ) -> Vec3<C::F> {
+    // gravity as an acceleration of the base by -g
     let base = Spatial([-gravity(m, &b.params), Vec3::zero()]);
     for (k, body) in m.bodies.iter().enumerate() {
         let arm = arm(cx, b, k, body);
         let w = &mut b.work;
+        // of the carrier: a, α and ω
         let (above, spin) = match body.parent {
             Some(parent) => (w.force[parent], w.velocity[parent][ANGULAR]),
             None => (base, Vec3::zero()),
         };
+        // what the carrier alone gives the body: a + α × r + ω × (ω × r), and α
         let carried = [point_acceleration(above, spin, arm), above[ANGULAR]];
         let axes = w.rotation[k];
         let z = axes[2];
         let d = body.dof;
         w.force[k] = Spatial(match body.motion {
             Motion::Revolute => {
+                // α += z q̈ + ω × z q̇
                 let turn = z * cx.get(&b.joint_qd[d]);
                 let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(turn));
                 [carried[LINEAR], carried[ANGULAR] + own]
             }
             Motion::Prismatic => {
+                // a += z q̈ + 2 ω × z q̇
                 let slide = z * (cx.get(&b.joint_qd[d]) * C::F::c(2.0));
                 let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(slide));
                 [carried[LINEAR] + own, carried[ANGULAR]]
             }
             Motion::Ball => {
+                // α += R q̈ + ω × R q̇, the dofs of a ball being about its own axes
                 let turn = axes * read::<C>(cx, &b.joint_qd, d);
                 let own = axes.mul_add(read::<C>(cx, &b.joint_qdd, d), spin.cross(turn));
                 [carried[LINEAR], carried[ANGULAR] + own]
             }
             Motion::Free => {
+                // q̈ is of the centre of mass, from which the frame's origin is at -R c
                 let (linear, angular) = (
                     read::<C>(cx, &b.joint_qdd, d),
                     read::<C>(cx, &b.joint_qdd, d + 3),
@@ -130,8 +141,10 @@ fn newton_euler<F: Num>(
     center: [F::Real; 3],
     (axes, omega, acceleration): (&Mat3<F>, Vec3<F>, Spatial<F>),
 ) -> Spatial<F> {
+    // F = m (a + α × c + ω × (ω × c))
     let center = axes * Vec3::constant(center);
     let force = point_acceleration(acceleration, omega, center) * mass;
+    // N = I α + ω × I ω + c × F: the first two in the body's axes, where I is constant
     let (spin, turn) = (
         axes.transpose_mul(omega),
         axes.transpose_mul(acceleration[ANGULAR]),
@@ -160,6 +173,7 @@ fn arm<C: Cx>(
     body: &Body<<C::F as Num>::Real>,
 ) -> Vec3<C::F> {
     let w = &b.work;
+    // r at q = 0 in world axes, then a slide along z
     let rest = match body.parent {
         Some(parent) => w.rotation[parent] * Vec3::constant(body.position),
         None => Vec3::constant(body.position),

@@ -39,15 +39,18 @@ impl Stage for Kinematics {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        // every tree begins at its base, then free and mocap bodies set the reference points of theirs
         place_bases(m, b);
         // parents precede children (sim-model sorts them), so one forward pass suffices
         for (k, body) in m.bodies.iter().enumerate() {
             let place = place_body(cx, m, b, k);
             let origin = b.work.origin[k];
+            // origin from the body's own point: 0 except of a free body, whose point is the reference point
             let from_point = match body.motion {
                 Motion::Free => origin,
                 _ => Vec3::zero(),
             };
+            // from the carrier's point to the body's, or of a root from the reference point
             b.work.arm[k] = match body.parent {
                 // its point is the reference point
                 Some(parent) if m.bodies[parent].motion == Motion::Free => origin,
@@ -78,8 +81,10 @@ pub fn place_body<C: Cx>(
     k: usize,
 ) -> Vec3<C::F> {
     let body = &m.bodies[k];
+    // the pose at q = 0, then the joint's slide, then its rotation
     let (rest, place) = at_zero(b, body);
     let place = slid(cx, b, body, rest, place);
+    // R(parent) r(b) stays apart for the arm: p(b) - p(parent) would have the rounding of both
     let origin = match body.parent {
         Some(parent) => b.work.origin[parent] + place,
         None => place,
@@ -93,6 +98,7 @@ pub fn place_body<C: Cx>(
 /// Axes of a body whose joint is at 0, and its origin from that of its carrier, or from the base.
 #[inline(always)]
 fn at_zero<F: Num, V>(b: &Block<F, V>, body: &Body<F::Real>) -> (Mat3<F>, Vec3<F>) {
+    // R(parent) E(b) and R(parent) r(b)
     let place = Vec3::constant(body.position);
     match body.parent {
         Some(parent) => {
@@ -112,6 +118,7 @@ fn slid<C: Cx>(
     rest: Mat3<C::F>,
     place: Vec3<C::F>,
 ) -> Vec3<C::F> {
+    // + z q along the axis at rest
     match body.motion {
         Motion::Prismatic => rest[2].scale_add(cx.get(&b.joint_q[body.coord]), place),
         _ => place,
@@ -131,16 +138,19 @@ fn moved<C: Cx>(
     let (c, d, w) = (body.coord, body.dof, &mut b.work);
     match body.motion {
         Motion::Revolute => {
+            // E Rz(q) turns x and y in their plane and leaves z, S = (p × z, z)
             let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
             w.motion[d] = Spatial([origin.cross(z), z]);
             let columns = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
             (Mat3(columns), origin)
         }
         Motion::Prismatic => {
+            // S = (z, 0)
             w.motion[d] = Spatial([z, Vec3::zero()]);
             (rest, origin)
         }
         Motion::Ball => {
+            // R(parent) E R(q), and an axis of S along each of its columns
             let Mat3([x, y, z]) = quat::matrix(read_quat(cx, &b.joint_q, c));
             let rotation = Mat3([rest * x, rest * y, rest * z]);
             for i in 0..3 {
@@ -149,6 +159,7 @@ fn moved<C: Cx>(
             (rotation, origin)
         }
         Motion::Free => {
+            // R(q) in world axes, with R c from the frame's origin to the centre of mass
             let rotation = quat::matrix(read_quat(cx, &b.joint_q, c + 3));
             let center = rotation * Vec3::constant(body.center);
             let position = Vec3([
@@ -156,6 +167,7 @@ fn moved<C: Cx>(
                 cx.get(&b.joint_q[c + 1]),
                 cx.get(&b.joint_q[c + 2]),
             ]);
+            // the reference point is the centre of mass, about which S = 1
             w.reference[body.tree] = position + center;
             for i in 0..3 {
                 let mut axis = Vec3::zero();
@@ -166,6 +178,7 @@ fn moved<C: Cx>(
             (rotation, Vec3::zero() - center)
         }
         Motion::Mocap => {
+            // the client's position is the reference point, so the origin is 0
             w.reference[body.tree] = Vec3(std::array::from_fn(|i| b.mocap_pos[3 * c + i]));
             (quat::matrix(mocap_quat(&b.mocap_quat, c)), Vec3::zero())
         }
@@ -179,11 +192,15 @@ const NORM_MIN: f64 = 1e-15;
 /// as in MuJoCo.
 #[inline(always)]
 pub(in crate::step) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> {
+    // clients give (w, x, y, z) of any length
     let [w, x, y, z] = std::array::from_fn(|i| all[4 * k + i]);
+    // |q|², and where it is too small for a direction
     let square = w.fma(w, x.fma(x, y.fma(y, z * z)));
     let still = square.lt(F::c(NORM_MIN * NORM_MIN));
+    // lanes without direction divide by 1: a select, since other lanes of the block have one
     let scale = F::c(1.0).div(F::select(still, F::c(1.0), square).sqrt());
     let [zero, one] = [F::c(0.0), F::c(1.0)];
+    // unit length, or (0, 0, 0, 1) without direction
     let turned = [x * scale, y * scale, z * scale, w * scale];
     let [x, y, z, w] = turned;
     [
@@ -203,10 +220,12 @@ fn inertia<F: Num>(
     rotation: &Mat3<F>,
     origin: Vec3<F>,
 ) -> Inertia<F> {
+    // the whole body at once, with its constant mass
     if !masses::vary(m) {
         let (mass, inertia) = (F::k(body.mass), body.inertia.map(F::k));
         return Inertia::placed(mass, body.center, inertia, rotation, origin);
     }
+    // I(b) = Σ s I(link), all about the same point, with each link's scale s
     let mut sum = Inertia::zero();
     for part in &body.parts {
         let (mass, inertia) = masses::of_part(m, params, part);
@@ -223,6 +242,7 @@ fn inertia<F: Num>(
 #[inline(always)]
 fn rest_rotation<F: Num>(r: &Mat3<F>, body: &Body<F::Real>) -> Mat3<F> {
     match body.exchange {
+        // columns of R, exchanged and negated, which rounds nothing
         Some([x, y, z]) => Mat3([permuted(r, x), permuted(r, y), permuted(r, z)]),
         None => {
             let [x, y, z] = body.rotation;

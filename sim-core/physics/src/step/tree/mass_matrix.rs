@@ -35,6 +35,7 @@ impl Stage for MassMatrix {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let (w, params) = (&mut b.work, &b.params);
+        // places of the pattern that are on no path of the tree
         for &place in &m.mass_zeros {
             w.mass_matrix[place] = C::F::c(0.0);
         }
@@ -42,20 +43,24 @@ impl Stage for MassMatrix {
         for (k, body) in m.bodies.iter().enumerate().rev() {
             let composite = w.inertia[k];
             let is_free = m.trees[body.tree].free.is_some();
+            // row i of H: the dofs before it on its path, root first, and itself last
             for (axis, i) in body.dofs().enumerate() {
                 let dof = &m.dofs[i];
                 let entries = &m.mass_entries[dof.entries.0..dof.entries.1];
                 let (own, path) = entries.split_last().expect("a dof meets itself");
                 let diagonal;
                 if body.motion == Motion::Free {
+                    // S = 1: the row of Iᶜ, up to its diagonal
                     let row = free_row(&composite, axis);
                     for (entry, x) in path.iter().zip(row) {
                         w.mass_matrix[entry.place] = x;
                     }
                     diagonal = row[axis];
                 } else {
+                    // Iᶜ S(i) is the force of a unit acceleration, H(i,i) = S(i)ᵀ Iᶜ S(i)
                     let force = momentum(body.motion, &composite, &w.motion[i]);
                     diagonal = along(body.motion, &w.motion[i], force);
+                    // H(i,j) = S(j)ᵀ Iᶜ S(i) up the path. A free root has S = 1: its six entries are the force itself
                     let (base, path) = path.split_at(if is_free { 6 } else { 0 });
                     let force = write_path(m, w, k, path, force);
                     for (entry, x) in base.iter().zip(force.scalars()) {
@@ -64,10 +69,12 @@ impl Stage for MassMatrix {
                 }
                 w.mass_matrix[own.place] = diagonal;
             }
+            // Iᶜ(parent) += Iᶜ about the carrier's point
             if let Some(parent) = body.parent {
                 w.inertia[parent] = w.inertia[parent] + composite.moved(w.arm[k]);
             }
         }
+        // a drive's armature is on the diagonal. That of free joints belongs to MuJoCo's velocities, so it is not
         for &j in &m.diagonal_dofs {
             let own = m.pattern.at(j, j);
             let armature = param(m, params, Param::JointArmature, j, m.dofs[j].armature);
@@ -83,10 +90,12 @@ fn momentum<F: Num>(motion: Motion, composite: &Inertia<F>, axis: &Spatial<F>) -
     let h = composite.first_moment();
     match motion {
         Motion::Prismatic => {
+            // S = (z, 0): momentum m z, and h × z about the point
             let z = axis[LINEAR];
             Spatial([z * composite[0], h.cross(z)])
         }
         _ => {
+            // S = (0, z): momentum z × h, and I z about the point
             let z = axis[ANGULAR];
             Spatial([z.cross(h), composite.second_moment(z)])
         }
@@ -104,12 +113,14 @@ fn write_path<F: Num>(
     force: Spatial<F>,
 ) -> Spatial<F> {
     let (mut at, mut force) = (k, force);
+    // towards the root: the force moves to another point only where the body changes
     for entry in path.iter().rev() {
         let body = m.dofs[entry.other].body;
         if body != at {
             force = force.moved(w.arm[at]);
             at = body;
         }
+        // S(j) · Iᶜ S(i), both about the point of j's body
         w.mass_matrix[entry.place] = along(m.bodies[body].motion, &w.motion[entry.other], force);
     }
     // of a root, which has no carrier, it is not used
@@ -121,6 +132,7 @@ fn write_path<F: Num>(
 fn free_row<F: Num>(inertia: &Inertia<F>, axis: usize) -> [F; 6] {
     let Inertia([m, hx, hy, hz, xx, yy, zz, xy, xz, yz]) = *inertia;
     let o = F::c(0.0);
+    // lower triangle of [[m 1, -h×], [h×, I]]
     match axis {
         0 => [m, o, o, o, o, o],
         1 => [o, m, o, o, o, o],
