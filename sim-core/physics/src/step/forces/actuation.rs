@@ -67,6 +67,7 @@ impl Stage for JointTorque {
 /// Writes `smooth_force`: applied and drive forces, less damping and bias.
 #[inline(always)]
 fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // applied and drive forces
     for body in &m.bodies {
         let torques = torques(cx, m, b, body);
         b.work.smooth_force[body.dofs()].copy_from_slice(&torques[..body.motion.dofs()]);
@@ -77,9 +78,11 @@ fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let force = &mut b.work.smooth_force[j];
         *force = cx.get(&b.joint_qd[j]).fnma(damping, *force);
     }
+    // the bias: Coriolis, centrifugal and gravity forces
     for (force, bias) in b.work.smooth_force.iter_mut().zip(&b.work.bias_force) {
         *force = *force - *bias;
     }
+    // forces of clients on links, where they are parameters
     if let Some(first) = m.varying.first(Param::BodyF) {
         add_link_forces(m, &b.params, first, &mut b.work);
     }
@@ -106,6 +109,7 @@ fn torques<C: Cx>(
     let first = body.dof;
     match body.motion {
         Motion::Revolute | Motion::Prismatic => {
+            // q* - q
             let target = command_of::<C>(m, b, Kind::Position, first);
             let error = target - cx.get(&b.joint_q[body.coord]);
             torques[0] = joint_force(cx, m, b, first, error);
@@ -146,9 +150,11 @@ fn joint_force<C: Cx>(
         -qd
     };
     let mut drive = rate * param(m, &b.params, Param::JointTargetKd, j, dof.kd);
+    // clamp(ke (q* - q) + kd (q̇* - q̇), ± limit)
     if dof.follows_position {
         drive = error.fma(param(m, &b.params, Param::JointTargetKe, j, dof.ke), drive);
     }
+    // the limit of each world where it varies, otherwise the model's
     let limit = match m.varying.first(Param::JointEffortLimit) {
         Some(first) => Some(b.params[first + j]),
         None => dof.effort_limit.map(C::F::k),
@@ -171,6 +177,7 @@ fn add_link_forces<F: Num>(
     link_forces::clear(w);
     for (link, frame) in m.frames.iter().enumerate() {
         if let Some(body) = frame.body {
+            // force and torque at the link's own centre of mass, in world axes
             let given = &params[first + 6 * link..first + 6 * link + 6];
             let force = Vec3([given[0], given[1], given[2]]);
             let torque = Vec3([given[3], given[4], given[5]]);
@@ -178,6 +185,7 @@ fn add_link_forces<F: Num>(
             link_forces::add(w, body, point, force, torque);
         }
     }
+    // Σ Jᵀ body_f
     link_forces::project(m, w);
     for (smooth, projected) in w.smooth_force.iter_mut().zip(&w.joint_force) {
         *smooth = *smooth + *projected;
@@ -193,11 +201,13 @@ fn ball_error<C: Cx>(
     coord: usize,
     dof: usize,
 ) -> Vec3<C::F> {
+    // q* = exp of the target
     let mut turn = Vec3::zero();
     for k in 0..3 {
         turn[k] = command_of::<C>(m, b, Kind::Position, dof + k);
     }
     let target = quat::exp(turn);
+    // the rotation from q to q*, along which the drive's spring pulls
     let here = read_quat(cx, &b.joint_q, coord);
     quat::log(mul(conjugate(here), target))
 }

@@ -55,11 +55,13 @@ impl Stage for Actuators {
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         b.work.qfrc_actuator.fill(C::F::c(0.0));
+        // ȧ first, since the force of an `early` actuator is that of the next activation
         for (k, actuator) in m.actuators.all.iter().enumerate() {
             if let Some(activation) = &actuator.activation {
                 b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
             }
         }
+        // the scale of a tendon's actuators is in the place of their forces until these are known
         for bound in &m.actuators.tendon_bounds {
             let scale = tendon_scale(cx, m, b, bound);
             for &k in &bound.actuators {
@@ -67,18 +69,22 @@ impl Stage for Actuators {
             }
         }
         for (k, actuator) in m.actuators.all.iter().enumerate() {
+            // input and force, (g₀ + g₁ l + g₂ v) input + b₀ + b₁ l + b₂ v
             let input = input(cx, b, actuator, k);
             let mut force = force(cx, m, b, k, input);
+            // a tendon bounds the sum of its forces before each is clamped
             let mut bounds = m.actuators.tendon_bounds.iter();
             if bounds.any(|bound| bound.actuators.contains(&k)) {
                 force = force * b.work.actuator_force[k];
             }
             let force = bounded(force, actuator.force_range);
             b.work.actuator_force[k] = force;
+            // Σ c force, where the moments c are constant
             for term in &actuator.terms {
                 let joint = &mut b.work.qfrc_actuator[term.dof];
                 *joint = force.fma(C::F::k(term.coefficient), *joint);
             }
+            // and where they change with the state
             if let Some(length) = &actuator.turning {
                 let w = &mut b.work;
                 for (k, &dof) in length.dofs.iter().enumerate() {
@@ -87,14 +93,17 @@ impl Stage for Actuators {
                 }
             }
         }
+        // gravity compensation that counts as an actuator, so that the bounds below hold for it, too
         for &dof in &m.compensation.actuated_dofs {
             let joint = &mut b.work.qfrc_actuator[dof];
             *joint = *joint + b.work.qfrc_gravcomp[dof];
         }
+        // clamp of the sum on a dof (MuJoCo: `actuatorfrcrange`)
         for bound in &m.actuators.dof_bounds {
             let joint = &mut b.work.qfrc_actuator[bound.dof];
             *joint = bounded(*joint, Some(bound.range));
         }
+        // smooth += Jᵀ force
         for (smooth, joint) in b.work.smooth_force.iter_mut().zip(&b.work.qfrc_actuator) {
             *smooth = *smooth + *joint;
         }
@@ -110,6 +119,7 @@ fn tendon_scale<C: Cx>(
     bound: &TendonBound<<C::F as Num>::Real>,
 ) -> C::F {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    // Σ force, before any clamp
     let mut sum = zero;
     for &k in &bound.actuators {
         let input = input(cx, b, &m.actuators.all[k], k);
@@ -117,6 +127,7 @@ fn tendon_scale<C: Cx>(
     }
     // a sum of 0 stays, whatever the range is
     let acts = zero.lt(sum.abs());
+    // clamp(Σ force) / Σ force, where worlds with the sum 0 divide by 1
     let within = bounded(sum, Some(bound.range));
     C::F::select(acts, within.div(C::F::select(acts, sum, one)), one)
 }
@@ -140,6 +151,7 @@ fn rate<C: Cx>(
         ActivationRate::Held => C::F::c(0.0),
         ActivationRate::Control => control(b, actuator, k),
         ActivationRate::Filter(time) => {
+            // ȧ = (clamp(ctrl) - a) / T
             let off = control(b, actuator, k) - cx.get(&b.act[activation.place]);
             off.div(C::F::k(time))
         }
@@ -163,6 +175,7 @@ fn input<C: Cx>(
     let Some(activation) = &actuator.activation else {
         return control(b, actuator, k);
     };
+    // `early`: the force is that of the activation after this step (MuJoCo: `actearly`)
     let act = cx.get(&b.act[activation.place]);
     match activation.early {
         true => next(activation, act, b.work.act_dot[activation.place]),
@@ -175,6 +188,7 @@ fn input<C: Cx>(
 fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, input: C::F) -> C::F {
     let actuator = &m.actuators.all[k];
     let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
+    // l and v = Σ moment q̇ of a length whose moments change
     if let Some(turning) = &actuator.turning {
         length = measure(cx, m, b, turning);
         for (k, &dof) in turning.dofs.iter().enumerate() {
@@ -182,6 +196,7 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
             velocity = cx.get(&b.joint_qd[dof]).fma(moment, velocity);
         }
     }
+    // l = Σ c q and v = Σ c q̇
     for term in &actuator.terms {
         let coefficient = C::F::k(term.coefficient);
         length = cx
@@ -191,6 +206,7 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
     }
     b.work.actuator_length[k] = length;
     b.work.actuator_velocity[k] = velocity;
+    // g = g₀ + g₁ l + g₂ v, and b alike
     let gain = law(
         m,
         &b.params,
@@ -217,6 +233,7 @@ fn law<F: Num>(
     (k, own): (usize, [F::Real; 3]),
     [length, velocity]: [F; 2],
 ) -> F {
+    // factors that are 0 in the model may vary from world to world
     let varies = m.varying.first(which).is_some();
     let mut sum = param(m, params, which, 3 * k, own[0]);
     // most actuators have no such term
@@ -244,6 +261,7 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
     let dt = C::F::k(m.dt);
     for &k in &m.actuators.damped {
         let actuator = &m.actuators.all[k];
+        // ∂force/∂v = g₂ input + b₂
         let input = input(cx, b, actuator, k);
         let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
             param(m, &b.params, which, 3 * k + 2, own[2])
@@ -251,12 +269,15 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         let gain = of(Param::ActuatorGain, actuator.gain);
         let slope = gain.fma(input, of(Param::ActuatorBias, actuator.bias));
         let mut damping = -(slope * dt);
+        // a force at its bound does not change with the velocity: no damping in that world
         if let Some([least, most]) = actuator.force_range {
             let force = b.work.actuator_force[k];
             let within: MaskOf<C> = C::F::k(least).lt(force) & force.lt(C::F::k(most));
             damping = C::F::select(within, damping, C::F::c(0.0));
         }
+        // M += Jᵀ (-h ∂force/∂v) J
         add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
+        // the same by moments, and on the right-hand side what MuJoCo's q̈ of free joints has more than ours
         if let Some(length) = &actuator.turning {
             let w = &mut b.work;
             let moments = &w.actuator_moment[length.first..];
@@ -264,6 +285,7 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
             subtract_swing(cx, m, b, length, damping);
         }
     }
+    // M += Jᵀ (h damping) J of tendons
     for tendon in &m.springs.tendons {
         let damping = C::F::k(tendon.damping) * dt;
         add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
@@ -281,21 +303,25 @@ fn subtract_swing<C: Cx>(
     x: C::F,
 ) {
     for (k, body) in m.bodies.iter().enumerate() {
+        // free bodies that the length depends on
         let first = length.dofs.iter().position(|&dof| dof == body.dof);
         let (Motion::Free, Some(first)) = (body.motion, first) else {
             continue;
         };
+        // ω × (ω × o), with o = -R c the frame's origin from the centre of mass
         let omega = Vec3(std::array::from_fn(|i| {
             cx.get(&b.joint_qd[body.dof + 3 + i])
         }));
         let w = &mut b.work;
         let arm = Vec3::zero() - w.rotation[k] * Vec3::constant(body.center);
         let swing = omega.cross(omega.cross(arm));
+        // J c: the swing has no angular part
         let mut sum = C::F::c(0.0);
         for i in 0..3 {
             let moment = w.actuator_moment[length.first + first + i];
             sum = moment.fma(swing[i], sum);
         }
+        // acceleration -= Jᵀ x J c
         for (place, &dof) in length.dofs.iter().enumerate() {
             if shared(m, dof, body.dof).is_some() {
                 let moment = w.actuator_moment[length.first + place];
@@ -313,6 +339,7 @@ fn add_product<F: Num>(
     terms: &[Term<F::Real>],
     x: F,
 ) {
+    // each pair of terms once: the matrix keeps its lower triangle
     for (i, first) in terms.iter().enumerate() {
         let scaled = x * F::k(first.coefficient);
         for second in &terms[..i + 1] {
@@ -346,6 +373,7 @@ fn add_moments<F: Num>(
 /// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
 #[inline(always)]
 fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
+    // row of the later dof, which has entries for those on its path to the root alone
     let (lower, upper) = (first.max(second), first.min(second));
     let (start, end) = m.dofs[lower].entries;
     let mut met = m.mass_entries[start..end].iter();

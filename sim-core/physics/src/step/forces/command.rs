@@ -48,13 +48,16 @@ pub(in crate::step) enum Kind {
 fn delay_commands<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let n = m.dofs.len();
     let applied = &mut b.work.applied;
+    // the commands of this frame, kind by kind
     applied[..n].copy_from_slice(&b.joint_f);
     applied[n..2 * n].copy_from_slice(&b.joint_target_q);
     applied[2 * n..].copy_from_slice(&b.joint_target_qd);
     let delay = m.varying.first(Param::CommandDelay);
     if let Some(delay) = delay.filter(|_| m.delay.frames > 0) {
         let substep = cx.get(&b.substep[0]);
+        // a command is due if its frame began at least delay - s substeps before this one
         let late = b.params[delay] - substep;
+        // the last command first: an earlier one replaces it where it is not due
         for (age, sent) in b.command_history.chunks_exact(3 * n).enumerate() {
             // due: the frame after it is not due yet
             let is_due = C::F::c((age * m.delay.substeps) as f64).lt(late);
@@ -62,8 +65,10 @@ fn delay_commands<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 *applied = C::F::select(is_due, *sent, *applied);
             }
         }
+        // s of the next substep
         cx.set(&mut b.substep[0], substep + C::F::c(1.0));
     }
+    // the noise of a frame is the same in all of its substeps
     for (applied, noise) in applied.iter_mut().zip(&b.command_noise) {
         *applied = *applied + *noise;
     }
@@ -77,6 +82,7 @@ pub(in crate::step) fn command_of<C: Cx>(
     command: Kind,
     j: usize,
 ) -> C::F {
+    // without delay and noise there is no copy: the command acts as it was sent
     if m.alters_commands() {
         return b.work.applied[command as usize * m.dofs.len() + j];
     }

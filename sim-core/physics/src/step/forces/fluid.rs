@@ -55,6 +55,7 @@ pub(in crate::step) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<
     for drag in &m.drags {
         let flow = Flow::of(w, drag);
         let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
+        // f = -(c + d |v|) v and n = -(c + d |ω|) ω, axis by axis
         for i in 0..3 {
             let pull = flow.resistance(drag, LINEAR, i, 1.0) * flow.speed[LINEAR][i];
             let turn = flow.resistance(drag, ANGULAR, i, 1.0) * flow.speed[ANGULAR][i];
@@ -63,6 +64,7 @@ pub(in crate::step) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<
         }
         link_forces::add(w, drag.body, flow.point, force, torque);
     }
+    // Σ Jᵀ f over all links
     link_forces::project(m, w);
 }
 
@@ -80,9 +82,11 @@ impl<F: Num> Flow<F> {
     #[inline(always)]
     fn of(w: &Workspace<F>, drag: &Drag<F::Real>) -> Flow<F> {
         let (rotation, velocity) = (&w.rotation[drag.body], w.velocity[drag.body]);
+        // centre of mass p from the reference point, and its velocity v + ω × p - wind
         let point = rotation.mul_add(Vec3::constant(drag.center), w.origin[drag.body]);
         let moved = velocity[ANGULAR].cross_add(point, velocity[LINEAR]);
         let moved = moved - Vec3::constant(drag.wind);
+        // both velocities along the axes of inertia
         let (mut axes, mut speed) = ([Vec3::zero(); 3], [Vec3::zero(); 2]);
         for i in 0..3 {
             axes[i] = rotation * Vec3::constant(drag.axes[i]);
@@ -107,9 +111,11 @@ pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>
     for drag in &m.drags {
         let flow = Flow::of(w, drag);
         let tree = m.bodies[drag.body].tree;
+        // dofs on the path of the body's last dof to the root: all that move the link
         let last = m.bodies[drag.body].dofs().end - 1;
         let path = m.dofs[last].entries;
         let path = &m.mass_entries[path.0..path.1];
+        // a row of J and its damping for each of six directions
         for part in [LINEAR, ANGULAR] {
             for i in 0..3 {
                 let axis = flow.axes[i];
@@ -122,6 +128,7 @@ pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>
                         _ => axis.dot(motion[ANGULAR]),
                     };
                 }
+                // h (c + 2 d |v|) = -h ∂f/∂v
                 let damping = flow.resistance(drag, part, i, 2.0) * dt;
                 // only the acceleration of a free body's frame differs from ours
                 let swing = match (part, m.trees[tree].free) {
@@ -131,6 +138,7 @@ pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>
                     }
                     _ => None,
                 };
+                // M += Jᵀ x J, and the right-hand side less Jᵀ x J c
                 add_row::<C>(m, w, last, damping, swing);
             }
         }
@@ -150,12 +158,14 @@ fn add_row<C: Cx>(
         let (start, end) = m.dofs[dof].entries;
         &m.mass_entries[start..end]
     };
+    // each pair of dofs once: a dof with those before it on the path
     for row in of(last) {
         let scaled = w.step[row.other] * x;
         for entry in of(row.other) {
             let place = &mut w.mass_matrix[entry.place];
             *place = scaled.fma(w.step[entry.other], *place);
         }
+        // -Jᵀ x J c, `swing` being J c
         if let Some(swing) = swing {
             let force = &mut w.acceleration[row.other];
             *force = scaled.fnma(swing, *force);

@@ -28,9 +28,11 @@ impl Stage for GravityCompensation {
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         forces::<C>(m, b);
         let w = &mut b.work;
+        // joints without `actuatorgravcomp`
         for &d in &m.compensation.passive_dofs {
             w.smooth_force[d] = w.smooth_force[d] + w.joint_force[d];
         }
+        // of the other joints, `actuators` adds it
         if !m.compensation.actuated_dofs.is_empty() {
             w.qfrc_gravcomp.copy_from_slice(&w.joint_force);
         }
@@ -40,15 +42,18 @@ impl Stage for GravityCompensation {
 /// Writes the forces that hold bodies against gravity to `joint_force`.
 #[inline(always)]
 pub(in crate::step) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // -g
     let up = -gravity(m, &b.params);
     let (w, params) = (&mut b.work, &b.params);
     link_forces::clear(w);
     for held in &m.compensation.links {
+        // -s m g at the centre of mass, with the mass that the link has in each world
         let center = Vec3::constant(held.center);
         let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
         let mass = masses::mass(m, params, held.link, held.mass);
         let force = up * (mass * C::F::k(held.share));
         link_forces::add(w, held.body, point, force, Vec3::zero());
     }
+    // Σ Jᵀ f
     link_forces::project(m, w);
 }

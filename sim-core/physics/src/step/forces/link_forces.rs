@@ -31,14 +31,17 @@ pub(in crate::step) fn add<F: Num>(
 /// Writes to `joint_force` what the forces on bodies are in joint space.
 #[inline(always)]
 pub(in crate::step) fn project<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    // children follow their parents: backwards, a force includes that of the subtree when it is reached
     for (k, body) in m.bodies.iter().enumerate().rev() {
         let force = w.force[k];
+        // S · f, and S = 1 of a free body
         for (axis, d) in body.dofs().enumerate() {
             w.joint_force[d] = match body.motion {
                 Motion::Free => force.scalars()[axis],
                 _ => w.motion[d].dot(force),
             };
         }
+        // all forces are about the robot's reference point, so they add without moving
         if let Some(parent) = body.parent {
             w.force[parent] = w.force[parent] + force;
         }

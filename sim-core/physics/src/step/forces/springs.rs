@@ -49,8 +49,10 @@ impl Stage for Springs {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        // out of the block while that is read
         let mut smooth = std::mem::take(&mut b.work.smooth_force);
         add_springs(cx, m, b, &mut smooth);
+        // free joints: -Tᵀ (D T v + A c)
         free_joints::add_damping_forces(cx, m, b, &mut smooth);
         free_joints::add_swing_forces(cx, m, b, 1.0, &mut smooth);
         b.work.smooth_force = smooth;
@@ -76,18 +78,22 @@ impl Stage for Passive {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let mut passive = std::mem::take(&mut b.work.passive_force);
         passive.fill(C::F::c(0.0));
+        // -damping q̇ of joints, which `actuation` adds in a step
         for &j in &m.diagonal_dofs {
             let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
             passive[j] = -(cx.get(&b.joint_qd[j]) * damping);
         }
         add_springs(cx, m, b, &mut passive);
+        // without Tᵀ A c: armature is no passive force
         free_joints::add_damping_forces(cx, m, b, &mut passive);
+        // gravity compensation of joints where it does not count as an actuator
         if !m.compensation.links.is_empty() {
             gravity_compensation::forces::<C>(m, b);
             for &d in &m.compensation.passive_dofs {
                 passive[d] = passive[d] + b.work.joint_force[d];
             }
         }
+        // drag of the medium
         if !m.drags.is_empty() {
             fluid::forces(m, &mut b.work);
             for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {
@@ -101,11 +107,13 @@ impl Stage for Passive {
 /// Adds the forces of springs, and of springs and dampers of tendons.
 #[inline(always)]
 fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
+    // -stiffness (q - rest)
     for spring in &m.springs.joints {
         let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
         let force = &mut to[spring.dof];
         *force = stretch.fnma(C::F::k(spring.stiffness), *force);
     }
+    // stretch, and the rate v = Σ c q̇ of the length
     for tendon in &m.springs.tendons {
         let stretch = stretch(cx, m, b, tendon);
         let mut velocity = C::F::c(0.0);
@@ -113,6 +121,7 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
             let qd = cx.get(&b.joint_qd[term.dof]);
             velocity = qd.fma(C::F::k(term.coefficient), velocity);
         }
+        // stiffness stretch + damping v, on each joint times its coefficient
         let damped = velocity * C::F::k(tendon.damping);
         let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
         for term in &tendon.terms {
@@ -120,16 +129,19 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
             *force = pull.fnma(C::F::k(term.coefficient), *force);
         }
     }
+    // stiffness times the slide and the rotation vector from rest
     for spring in &m.springs.poses {
         let body = &m.bodies[spring.body];
         let stiffness = C::F::k(spring.stiffness);
         let [slide, turn] = map(pose_stretch(cx, m, b, spring), |x| x * stiffness);
         let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
         let force = &mut to[body.dofs()];
+        // at the frame's origin, the torque in the body's axes
         if body.motion == Motion::Free {
             free_joints::subtract(force, [slide, turn], rotation, origin);
             continue;
         }
+        // a ball's dofs and its rotation vector are both in the body's axes
         for i in 0..3 {
             force[i] = force[i] - turn[i];
         }
@@ -147,12 +159,14 @@ pub(in crate::step) fn pose_stretch<C: Cx>(
     let body = &m.bodies[spring.body];
     let mut slide = Vec3::zero();
     let mut first = body.coord;
+    // where a free joint's frame is from its rest, in world axes
     if body.motion == Motion::Free {
         for i in 0..3 {
             slide[i] = cx.get(&b.joint_q[first + i]) - C::F::k(spring.position[i]);
         }
         first += 3;
     }
+    // log(rest⁻¹ q)
     let here = read_quat(cx, &b.joint_q, first);
     let rest = quat::constant(spring.quat);
     [slide, quat::log(mul(conjugate(rest), here))]
@@ -167,6 +181,7 @@ pub(in crate::step) fn stretch<C: Cx>(
     tendon: &Tendon<<C::F as Num>::Real>,
 ) -> C::F {
     let length = length(cx, m, b, &tendon.terms);
+    // 0 between the rests
     let [shortest, longest] = tendon.rest.map(C::F::k);
     length - length.max(shortest).min(longest)
 }

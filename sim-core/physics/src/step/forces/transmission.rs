@@ -28,20 +28,24 @@ pub(in crate::step) fn measure<C: Cx>(
     b: &mut BlockOf<C>,
     length: &TurningLength<<C::F as Num>::Real>,
 ) -> C::F {
+    // gears of translations, then of rotations
     let [x, y, z, u, v, w] = length.gear.map(C::F::k);
     let (along, about) = (Vec3([x, y, z]), Vec3([u, v, w]));
     match &length.kind {
         LengthKind::Ball { coord, in_parent } => {
             let turned = read_quat(cx, &b.joint_q, *coord);
+            // into the ball's axes, in which its dofs are
             let gear = match in_parent {
                 true => quat::matrix(turned).transpose_mul(along),
                 false => along,
             };
+            // l = gear · θ, and the moments are the gear itself, as in MuJoCo
             moments(&mut b.work, length)[..3].copy_from_slice(&*gear);
             quat::log(turned).dot(gear)
         }
         LengthKind::Free { body, in_parent } => {
             let own = &mut b.work;
+            // R gear, or the gear itself where it is in world axes
             let torque = match in_parent {
                 true => about,
                 false => own.rotation[*body] * about,
@@ -73,10 +77,12 @@ fn of_sites<F: Num>(
     sites: &Sites<F::Real>,
     [along, about]: [Vec3<F>; 2],
 ) -> F {
+    // R gear is the force and the torque of a unit, R that of the second site if there is one
     let site = placed(w, &sites.site);
     let reference = sites.reference.as_ref().map(|mount| placed(w, mount));
     let axes = &reference.as_ref().unwrap_or(&site).rotation;
     let push = Spatial([axes * along, axes * about]);
+    // moment of a dof: force · ẋ + torque · ω of the site, less those of the reference
     for (k, &dof) in length.dofs.iter().enumerate() {
         let Spatial([linear, angular]) = w.motion[dof];
         let mut moment = F::c(0.0);
@@ -90,17 +96,21 @@ fn of_sites<F: Num>(
                 continue;
             };
             if carries(m, mount.body, dof) {
+                // v + ω × p at the site, per unit of q̇
                 let velocity = Spatial([angular.cross_add(placed.point, linear), angular]);
                 moment = F::c(sign).fma(velocity.dot(push), moment);
             }
         }
         w.actuator_moment[length.first + k] = moment;
     }
+    // without a second site there is nothing to measure
     let Some(reference) = reference else {
         return F::c(0.0);
     };
+    // R'ᵀ (x - x'): reference points of trees are subtracted on their own, since f32 rounds far positions
     let apart = (site.point - reference.point) + (site.reference - reference.reference);
     let apart = reference.rotation.transpose_mul(apart);
+    // θ, from the axes of the second site to those of the first
     let turned = quat::log(between(&site.rotation, &reference.rotation));
     apart.dot(along) + turned.dot(about)
 }

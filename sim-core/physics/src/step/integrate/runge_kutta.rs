@@ -105,9 +105,11 @@ impl<const K: usize> Stage for RungeKutta<K> {
         // scratch with an entry per dof, out of the block while that is read
         let mut velocity = std::mem::take(&mut b.work.start);
         let mut acceleration = std::mem::take(&mut b.work.step);
+        // vₖ and v̇ₖ as MuJoCo has them
         velocities(cx, m, b, &mut velocity);
         accelerations(cx, m, b, &mut acceleration);
         let w = &mut b.work;
+        // x, from which every point and the next state are reached
         if K == 0 {
             for c in 0..m.coords {
                 w.rk_q[c] = cx.get(&b.joint_q[c]);
@@ -115,17 +117,20 @@ impl<const K: usize> Stage for RungeKutta<K> {
             }
             w.rk_velocity.copy_from_slice(&velocity);
         }
+        // the solver of each evaluation starts from the last step's accelerations
         if K < 3 {
             for j in 0..m.dofs.len() {
                 cx.set(&mut b.joint_qdd[j], w.rk_warm_start[j]);
             }
         } else if m.prescribed_search().is_some() {
+            // the next step starts from these, which a prescribed search keeps as MuJoCo has them
             for (_, dof) in free_bodies(m) {
                 for j in dof..dof + 6 {
                     cx.set(&mut b.joint_qdd[j], acceleration[j]);
                 }
             }
         }
+        // Σ bₖ vₖ and Σ bₖ v̇ₖ, in the order of k
         let share = C::F::c(SHARES[K]);
         for j in 0..m.dofs.len() {
             let zero = C::F::c(0.0);
@@ -135,20 +140,25 @@ impl<const K: usize> Stage for RungeKutta<K> {
             };
             w.rk_velocity_sum[j] = velocity[j].fma(share, v);
             w.rk_acceleration_sum[j] = acceleration[j].fma(share, a);
+            // the next state is reached by the sums
             if K == 3 {
                 (velocity[j], acceleration[j]) = (w.rk_velocity_sum[j], w.rk_acceleration_sum[j]);
             }
         }
         go_on_acting::<C, K>(cx, m, b);
+        // h aₖ, and h to the next state
         let reach = C::F::c(m.dt.to_f64() * REACHES.get(K).copied().unwrap_or(1.0));
+        // positions first: free velocities below need the new rotations
         for body in &m.bodies {
             go(cx, b, body, &velocity, reach, K == 3);
         }
+        // velocities from where they were in x, as MuJoCo has them
         for j in 0..m.dofs.len() {
             let next = acceleration[j].fma(reach, b.work.rk_velocity[j]);
             cx.set(&mut b.joint_qd[j], next);
             acceleration[j] = next;
         }
+        // back to ours: of a free body's centre of mass, in world axes
         for (k, dof) in free_bodies(m) {
             set_free_velocity(cx, b, &m.bodies[k], &acceleration[dof..dof + 6]);
         }
@@ -162,13 +172,16 @@ fn go_on_acting<C: Cx, const K: usize>(cx: &mut C, m: &ConstantsOf<C>, b: &mut B
     let share = C::F::c(SHARES[K]);
     for activation in activations(m) {
         let (place, w) = (activation.place, &mut b.work);
+        // a of x, and Σ bₖ ȧₖ from 0
         if K == 0 {
             w.rk_act[place] = cx.get(&b.act[place]);
             w.rk_act_rate_sum[place] = C::F::c(0.0);
         }
+        // Σ bₖ ȧₖ, in the order of k
         let (start, rate) = (w.rk_act[place], w.act_dot[place]);
         let sum = rate.fma(share, w.rk_act_rate_sum[place]);
         w.rk_act_rate_sum[place] = sum;
+        // a + h aₖ ȧₖ at a point, and `next`, which clamps, for the next state alone
         let act = match REACHES.get(K) {
             Some(reach) => rate.fma(C::F::c(m.dt.to_f64() * reach), start),
             None => next(activation, start, sum),
@@ -188,14 +201,17 @@ fn go<C: Cx>(
     is_last: bool,
 ) {
     let (c, d) = (body.coord, body.dof);
+    // coordinates that the velocity adds to: all but quaternions
     let lines = match body.motion {
         Motion::Revolute | Motion::Prismatic => 1,
         Motion::Ball | Motion::Mocap => 0,
         Motion::Free => 3,
     };
+    // from x: quaternions, too
     for i in 0..body.motion.coords() {
         cx.set(&mut b.joint_q[c + i], b.work.rk_q[c + i]);
     }
+    // q + h aₖ v, where only the next state keeps its rounding error
     for i in 0..lines {
         cx.set(&mut b.joint_q_rest[c + i], b.work.rk_q_rest[c + i]);
         if is_last {
@@ -206,6 +222,7 @@ fn go<C: Cx>(
             cx.set(&mut b.joint_q[c + i], moved);
         }
     }
+    // the quaternion times exp(h aₖ ω), ω in the body's axes
     if matches!(body.motion, Motion::Ball | Motion::Free) {
         let spin = Vec3(std::array::from_fn(|i| velocity[d + lines + i]));
         let turned = quat::turned(read_quat(cx, &b.joint_q, c + lines), spin, time);
@@ -222,6 +239,7 @@ fn set_free_velocity<C: Cx>(
     velocity: &[C::F],
 ) {
     let [linear, own] = halves(velocity);
+    // ω = R ω' and v = v' + ω × R c, with the rotation that `go` wrote
     let rotation = quat::matrix(read_quat(cx, &b.joint_q, body.coord + 3));
     let spin = rotation * own;
     let center = spin.cross_add(rotation * Vec3::constant(body.center), linear);

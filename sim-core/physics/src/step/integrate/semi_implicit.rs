@@ -79,6 +79,7 @@ impl Stage for Integrate {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        // q̈' with implicit damping, or the solver's q̈
         if m.damped {
             implicit_acceleration(cx, m, b);
         } else {
@@ -86,12 +87,15 @@ impl Stage for Integrate {
                 b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
             }
         }
+        // the next solve starts from MuJoCo's accelerations: `acceleration` has what this step needs
         if m.prescribed_search().is_some() {
             keep_accelerations(cx, m, b);
         }
+        // free bodies that carry nothing, where the matrix has their inertia alone
         for &body in &m.gyroscopic_bodies {
             gyroscopic(cx, m, b, body);
         }
+        // q̇ += h q̈', then q by the new q̇ (clients place mocap bodies)
         for (k, body) in m.bodies.iter().enumerate() {
             if body.motion == Motion::Free {
                 integrate_free(cx, m, b, k);
@@ -99,6 +103,7 @@ impl Stage for Integrate {
                 integrate_joint(cx, m, b, body);
             }
         }
+        // activations, as far as ȧ reaches in a step, clamped to their ranges
         for activation in activations(m) {
             let act = cx.get(&b.act[activation.place]);
             let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
@@ -122,12 +127,14 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     if !<<C::F as Num>::Real as Real>::DOUBLE {
         rounded = crate::step::solver::touching(cx, m);
     }
+    // M q̈ in place of the forces, where a world of the block has contacts
     if rounded.is_some() {
         for j in 0..m.dofs.len() {
             w.start[j] = cx.get(&b.joint_qdd[j]);
         }
         multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force);
     }
+    // M + h D
     for &j in &m.diagonal_dofs {
         let dof = &m.dofs[j];
         // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
@@ -139,20 +146,25 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         let diagonal = m.pattern.at(j, j);
         w.mass_matrix[diagonal] = dt.fma(damping, w.mass_matrix[diagonal]);
     }
+    // right-hand side, by a select: worlds without contacts take the sum of their forces
     for j in 0..m.dofs.len() {
         w.acceleration[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
         if let Some(touching) = rounded {
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
         }
     }
+    // `implicitfast` has the derivatives of actuators, tendons and the medium as well
     if m.integrator == Integrator::ImplicitFast {
         actuators::add_damping(cx, m, b);
         fluid::add_damping::<C>(m, b);
     }
+    // damping of free joints, which is not diagonal in our velocities
     free_joints::add_damping(cx, m, b);
+    // h N is not symmetric: these bodies are solved apart, while their block of the matrix is there
     for &body in &m.solved_bodies {
         free_joints::solve(cx, m, b, body);
     }
+    // the other bodies, then the entries of those that were solved apart
     let w = &mut b.work;
     solve(&m.pattern, &mut w.mass_matrix, &mut w.acceleration);
     for &body in &m.solved_bodies {
@@ -169,11 +181,13 @@ fn integrate_joint<C: Cx>(
     body: &Body<<C::F as Num>::Real>,
 ) {
     let (c, dt) = (body.coord, C::F::k(m.dt));
+    // q̇ += h q̈'
     let mut qd = Vec3::zero();
     for (qd, d) in qd.iter_mut().zip(body.dofs()) {
         *qd = dt.fma(b.work.acceleration[d], cx.get(&b.joint_qd[d]));
         cx.set(&mut b.joint_qd[d], *qd);
     }
+    // q exp(h ω), ω in the body's axes, or q + h q̇
     if body.motion == Motion::Ball {
         let turned = quat::turned(read_quat(cx, &b.joint_q, c), qd, dt);
         write_quat(cx, &mut b.joint_q, c, turned);
@@ -192,10 +206,12 @@ pub(in crate::step) fn add_compensated<C: Cx>(
     dt: C::F,
 ) {
     let before = cx.get(q);
+    // double precision keeps no rounding error
     if <<C::F as Num>::Real as Real>::DOUBLE {
         cx.set(q, dt.fma(v, before));
         return;
     }
+    // this step's change and what rounding left of the last
     let change = dt.fma(v, cx.get(rest));
     let after = before + change;
     // exact where |q| is larger than the change, otherwise off by a rounding of the change
@@ -209,6 +225,7 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
     let (d, params, joint_qd) = (body.dof, &b.params, &b.joint_qd);
     let (rotation, acceleration) = (&b.work.rotation[k], &mut b.work.acceleration);
+    // ω, and α before the correction
     let (mut spin, mut angular) = (Vec3::zero(), Vec3::zero());
     for i in 0..3 {
         spin[i] = cx.get(&joint_qd[d + 3 + i]);
@@ -217,29 +234,35 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     // relative to the trace, so that determinants of small bodies stay within f32
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
+    // L = J ω
     let momentum = rotated_inertia(m, params, body, rotation, spin) * unit;
     let mut columns = [Vec3::zero(); 3];
+    // columns of A + h ∂(ω × L)/∂ω: J e + h (e × L + ω × J e)
     for (i, column) in columns.iter_mut().enumerate() {
         let mut axis = Vec3::zero();
         axis[i] = C::F::c(1.0);
         let inertia = rotated_inertia(m, params, body, rotation, axis) * unit;
         let rate = axis.cross_add(momentum, spin.cross(inertia));
         *column = rate.scale_add(dt, inertia);
+        // A has armature and h damping on the diagonal
         let (j, dof) = (d + 3 + i, &m.dofs[d + 3 + i]);
         let damping = param(m, params, Param::JointDamping, j, dof.damping);
         let armature = param(m, params, Param::JointArmature, j, dof.armature);
         let driven = dt.fma(damping, armature);
         column[i] = driven.fma(unit, column[i]);
     }
+    // -h (α × L + ω × J α)
     let inertia = rotated_inertia(m, params, body, rotation, angular) * unit;
     let rate = angular.cross_add(momentum, spin.cross(inertia));
     let change = rate * -dt;
+    // Cramer's rule: the rows of the inverse are cross products of columns over the determinant
     let [x, y, z] = columns;
     let minors = [y.cross(z), z.cross(x), x.cross(y)];
     let determinant = x.dot(minors[0]);
     for i in 0..3 {
         angular[i] = angular[i] + minors[i].dot(change).div(determinant);
     }
+    // S(α) = α × (ω × r) + ω × (α × r) with r = R c
     let arm = rotation * Vec3::constant(body.center);
     let swing = angular.cross_add(spin.cross(arm), spin.cross(angular.cross(arm)));
     for i in 0..3 {
@@ -258,10 +281,12 @@ fn rotated_inertia<F: Num>(
     rotation: &Mat3<F>,
     v: Vec3<F>,
 ) -> Vec3<F> {
+    // in the body's axes, where J is constant
     let v = rotation.transpose_mul(v);
     if !masses::vary(m) {
         return rotation * symmetric(body.inertia.map(F::k), v);
     }
+    // J v = Σ s (J(link) v + m d × (v × d)), d the link's centre from the body's
     let mut sum = Vec3::zero();
     for part in &body.parts {
         // about the centre that the scene has
@@ -282,6 +307,7 @@ fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: 
     let (c, d) = (body.coord, body.dof);
     let (rotation, acceleration) = (b.work.rotation[k], &b.work.acceleration);
     let (joint_q, rests, joint_qd) = (&mut b.joint_q, &mut b.joint_q_rest, &mut b.joint_qd);
+    // v(c), ω, a(c) and α
     let (mut velocity, mut spin, mut linear, mut angular) =
         (Vec3::zero(), Vec3::zero(), Vec3::zero(), Vec3::zero());
     for i in 0..3 {
@@ -290,19 +316,23 @@ fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: 
         linear[i] = acceleration[d + i];
         angular[i] = acceleration[d + 3 + i];
     }
+    // r = R c, v = v(c) - ω × r, a = a(c) - α × r - ω × (ω × r)
     let arm = rotation * Vec3::constant(body.center);
     let swing = spin.cross(arm);
     let origin = velocity - swing;
     let pull = (linear - angular.cross(arm)) - spin.cross(swing);
+    // v += h a, and ω' = Rᵀ ω + h Rᵀ α
     let origin = pull.scale_add(dt, origin);
     let own = rotation
         .transpose_mul(angular)
         .scale_add(dt, rotation.transpose_mul(spin));
+    // p += h v, R' = R exp(h ω')
     for i in 0..3 {
         add_compensated(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
     }
     let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
     write_quat(cx, joint_q, c + 3, turned);
+    // back to ours at the new rotation: ω = R' ω' and v(c) = v + ω × R' c
     let rotation = quat::matrix(turned);
     let spin = rotation * own;
     let velocity = origin + spin.cross(rotation * Vec3::constant(body.center));
