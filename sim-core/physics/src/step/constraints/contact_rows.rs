@@ -49,14 +49,17 @@ impl Stage for ContactRows {
 fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
     note_overflow(cx, t, &mut b.left_out[0]);
+    // contacts of a class have the same dofs as columns of J
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             let contact = Contact::read(cx, t, k, r);
             let velocity = contact.write_jacobian(cx, b);
+            // torsion and rolling, where a pair of the class has their friction
             if let Some(block) = class.turns {
                 contact.write_turning(cx, b, block);
             }
+            // ω × (ω × r) of free bodies, by which MuJoCo's J q̈ is less than ours
             let swing = swing_between(cx, m, b, class);
             contact.write_softness(cx, m, velocity, swing);
         });
@@ -88,7 +91,9 @@ impl<'a, C: Cx> Contact<'a, C> {
         let normal = load_vec3(cx, t.memory.rows, r, row::NORMAL);
         let point = load_vec3(cx, t.memory.rows, r, row::POINT);
         let pair = cx.load(t.memory.rows, r, row::PAIR);
+        // pairs of one class may differ in whether they have friction
         let rubs = shared(cx, t, class, pair, pair::RUBS);
+        // a pyramid depends on its tangents' directions: the narrow phase chose the first
         let along = match t.cone {
             Cone::Elliptic => None,
             Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
@@ -122,6 +127,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             Some(tree) if tree != class.trees.1 => self.point + (second - w.reference[tree]),
             _ => self.point,
         };
+        // p × axis, about the reference point of each side's tree
         let mut torques = [[Vec3::zero(); 3]; 2];
         for (i, axis) in frame.iter().enumerate() {
             torques[0][i] = point_first.cross(*axis);
@@ -131,10 +137,12 @@ impl<'a, C: Cx> Contact<'a, C> {
         let mut velocity = [C::F::c(0.0); 3];
         for (c, column) in class.columns.iter().enumerate() {
             let Spatial([linear, angular]) = w.motion[column.dof];
+            // 1, -1, or 0 where the dof moves both bodies alike or neither
             let lever = self.of_pair(cx, column.lever);
             let speed = cx.get(&b.joint_qd[column.dof]);
             let torques = &torques[usize::from(!column.is_first)];
             let mut jacobian = [C::F::c(0.0); 3];
+            // v = J q̇, where worlds without the contact get -0, which later sums ignore
             for i in 0..3 {
                 let moved = linear.dot(frame[i]) + angular.dot(torques[i]);
                 jacobian[i] = cx.or_nothing(lever * moved);
@@ -151,10 +159,12 @@ impl<'a, C: Cx> Contact<'a, C> {
     #[inline(always)]
     fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
         let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
+        // friction of torsion and of rolling over that of sliding
         let twist = cx.pick(t.turning, self.pair, 0) * self.rubs;
         let roll = cx.pick(t.turning, self.pair, 1) * self.rubs;
         let scales = [twist, roll, roll];
         let mut velocity = [zero; 3];
+        // J(i, dof) = ± scale (axis · ω)
         for (c, column) in self.class.columns.iter().enumerate() {
             let Spatial([_, angular]) = b.work.motion[column.dof];
             let lever = self.of_pair(cx, column.lever);
@@ -171,14 +181,17 @@ impl<'a, C: Cx> Contact<'a, C> {
                 jacobian,
             );
         }
+        // the edges of a pyramid have the damping of the normal row
         let damping = match t.cone {
             Cone::Elliptic => self.of_pair(cx, pair::SLIDING),
             Cone::Pyramidal => self.of_pair(cx, pair::DAMPING),
         };
+        // no force past the margin, as in `write_softness`
         let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
         let position = distance - self.of_pair(cx, pair::MARGIN);
         let smaller = self.of_pair(cx, pair::SMALLER);
         let pushes = position.lt(contact_slack(smaller));
+        // aref = -b v, and a row exists where its friction is positive
         let mut aref = [zero; 3];
         let mut exists = [zero; 3];
         for i in 0..3 {
@@ -192,13 +205,16 @@ impl<'a, C: Cx> Contact<'a, C> {
     /// d(r) of the contact's pair.
     #[inline(always)]
     fn impedance(&self, cx: &mut C, m: &ConstantsOf<C>, position: C::F) -> C::F {
+        // all pairs have the same impedance, or the class lists those of its pairs
         let Some(kinds) = m.contacts.impedances.of_classes.get(self.number) else {
             return impedance(&m.contact_impedance, position);
         };
+        // kind after kind, each selected where it is that of the pair
         let mut d = impedance(&m.contacts.impedances.all[kinds[0]], position);
         if let [_, others @ ..] = &kinds[..] {
             let own = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
             for &kind in others {
+                // places are whole, so within a half they are equal
                 let is_it = (own - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
                 d = C::F::select(
                     is_it,
@@ -221,23 +237,28 @@ impl<'a, C: Cx> Contact<'a, C> {
     ) {
         let (t, r) = (self.t, self.row);
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+        // r = distance - margin, and d(r)
         let distance = cx.load(t.memory.rows, r, row::DISTANCE);
         let position = distance - self.of_pair(cx, pair::MARGIN);
         let d = self.impedance(cx, m, position);
+        // μ of the pair, or that of the contact where it varies, and 0 without friction
         let mu = match t.memory.mu.rows {
             0 => self.of_pair(cx, pair::MU),
             _ => cx.load(t.memory.rows, r, row::MU),
         };
         let mu = mu * self.rubs;
+        // D₀ = d / ((1 - d) w), aref = -b v - k d r along the normal
         let weight = self.of_pair(cx, pair::WEIGHT);
         let stiff = d.div((one - d) * weight);
         let damping = self.of_pair(cx, pair::DAMPING);
         let spring = self.of_pair(cx, pair::STIFFNESS) * d * position;
         let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
+        // a pyramid has the D of its edges, and tangents are damped as its normal
         let (stiff, sliding) = match t.cone {
             Cone::Elliptic => (stiff, self.of_pair(cx, pair::SLIDING)),
             Cone::Pyramidal => (stiff * edge_stiffness(t.impratio, mu), damping),
         };
+        // a tangent has no position: aref = -b' v
         for i in 1..3 {
             aref[i] = -(velocity[i] * sliding);
         }
@@ -246,12 +267,14 @@ impl<'a, C: Cx> Contact<'a, C> {
         let pushes = position.lt(contact_slack(smaller));
         let stiff = C::F::select(pushes, stiff, zero);
         cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
+        // D₀ / (1 + μ²/impratio): the stiffness of a contact that slides
         if t.cone == Cone::Elliptic {
             let ratio = C::F::c(1.0 / t.impratio.to_f64());
             let soft = stiff.div((mu * mu).fma(ratio, one));
             cx.fill(t.memory.rows, r, row::SOFT, soft);
         }
         cx.fill(t.memory.rows, r, row::MU, mu);
+        // J q̈ - aref as MuJoCo has it: our J q̈ has the swing more, so aref gets it, too
         for (x, axis) in aref.iter_mut().zip(self.frame) {
             if let Some(swing) = swing {
                 *x = *x + axis.dot(swing);
@@ -265,6 +288,7 @@ impl<'a, C: Cx> Contact<'a, C> {
 /// D of a pyramid's edge over that of the elliptic cone's normal row: impratio / (2 μ² (1 + μ²)).
 #[inline(always)]
 fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
+    // D / D₀, bounded in `f32`
     let square = mu * mu;
     let mut edges = F::k(impratio).div(square + square);
     edges = edges.div(F::c(1.0) + square);
@@ -295,6 +319,7 @@ fn swing_between<C: Cx>(
         // both bodies move with the same tree
         return None;
     }
+    // of the second tree less that of the first, a static side having none
     let first = first.and_then(|tree| swing(cx, m, b, tree));
     let second = swing(cx, m, b, second);
     match (first, second) {
@@ -309,6 +334,7 @@ fn swing_between<C: Cx>(
 fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
     let free = m.trees[tree].free?;
     let body = &m.bodies[free];
+    // MuJoCo's acceleration of this body is ours
     if body.center.iter().all(|x| x.to_f64() == 0.0) {
         return None;
     }
@@ -323,16 +349,19 @@ fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> 
 /// Keeps the largest count of contacts that did not fit.
 #[inline(always)]
 fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mut C::V) {
+    // contacts that the world has no room for
     let mut left_out = C::F::c(0.0);
     if t.may_overflow {
         let row = cx.at(t.classes.len() + COUNT_LEFT_OUT);
         left_out = cx.load(t.memory.counts, row, 0);
     }
+    // and those that their class has none for, which are counted, but not kept
     for (k, class) in t.classes.iter().enumerate() {
         let row = cx.at(k);
         let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
         left_out = left_out + over.max(C::F::c(0.0));
     }
+    // the largest of all steps since it was cleared
     let left_out = cx.get(most).max(left_out);
     cx.set(most, left_out);
 }
@@ -369,12 +398,14 @@ fn shared<C: Cx>(
 #[inline(always)]
 pub(in crate::step) fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>) -> [Vec3<F>; 2] {
     let (zero, one) = (F::c(0.0), F::c(1.0));
+    // y, or z where the normal is within 60° of y
     let steep = normal[1].abs().lt(F::c(0.5));
     let axis = Vec3([
         zero,
         F::select(steep, one, zero),
         F::select(steep, zero, one),
     ]);
+    // the part of it across the normal, or that of the given direction
     let mut across = across(normal, axis);
     if let Some(along) = along {
         let first = self::across(normal, along);
@@ -384,6 +415,7 @@ pub(in crate::step) fn tangents<F: Num>(normal: Vec3<F>, along: Option<Vec3<F>>)
             *x = F::select(lies, y, *x);
         }
     }
+    // both of unit length: normal, first and second are a right-handed frame
     let first = across * one.div(across.dot(across).sqrt());
     [first, normal.cross(first)]
 }

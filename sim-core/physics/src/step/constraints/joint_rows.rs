@@ -33,6 +33,7 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut row = 0;
+    // equalities: r = q(follower) - multiplier q(leader) - offset
     for equality in &m.equalities {
         let multiplier = C::F::k(equality.multiplier);
         let (f, l) = (equality.follower, equality.leader);
@@ -45,12 +46,14 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         cx.set(&mut b.efc_aref[row], aref);
         row += 1;
     }
+    // dry friction has no position: aref = -b v, and D is a constant
     for friction in &m.frictions {
         let aref = -(cx.get(&b.joint_qd[friction.dof]) * C::F::k(friction.damping));
         cx.set(&mut b.efc_weight[row], C::F::k(friction.weight));
         cx.set(&mut b.efc_aref[row], aref);
         row += 1;
     }
+    // limits: r is the distance to the nearer bound, and rows begin without force
     let distance = &mut w.limit_distance;
     let mut nearest = zero;
     for (n, limit) in m.limits.iter().enumerate() {
@@ -65,8 +68,10 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     // most blocks have no world at a limit
     when!(cx, nearest.lt(zero), {
         for (n, limit) in m.limits.iter().enumerate() {
+            // side × q̇ is the rate of r
             let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
             let (weight, aref) = soft_row(&limit.soft, distance[n], velocity);
+            // other worlds of the block may be inside their range
             let active = distance[n].lt(zero);
             cx.set(
                 &mut b.efc_weight[row + n],
@@ -80,10 +85,12 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 /// x ≥ 0 to a power of at least 1. The digits of a power that is no whole number become roots.
 #[inline(always)]
 fn powered<F: Num>(x: F, power: f64) -> F {
+    // x to the whole part of the power
     let mut product = x;
     for _ in 1..power as usize {
         product = product * x;
     }
+    // times x^½, x^¼ … for the binary digits of the rest
     let (mut digits, mut root) = (power.fract(), x);
     while digits > 0.0 {
         root = root.sqrt();
@@ -99,8 +106,10 @@ fn powered<F: Num>(x: F, power: f64) -> F {
 /// (D, aref) of a row at this position and velocity.
 #[inline(always)]
 fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
+    // D = d / ((1 - d) × inverse weight)
     let d = impedance(&soft.impedance, position);
     let weight = d.div((F::c(1.0) - d) * F::k(soft.inverse_weight));
+    // aref = -b v - k d r
     let spring = F::k(soft.stiffness) * d * position;
     (weight, -velocity.fma(F::k(soft.damping), spring))
 }
@@ -109,9 +118,11 @@ fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
 #[inline(always)]
 pub(in crate::step) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) -> F {
     let (one, midpoint) = (F::c(1.0), i.midpoint.to_f64());
+    // |r| as a share of the width, 1 beyond it
     let x = (position.abs() * F::k(i.inverse_width)).min(one);
     let rest = one - x;
     let power = i.power.to_f64();
+    // x^p / m^(p-1) up to the midpoint m, 1 - (1 - x)^p / (1 - m)^(p-1) above
     let (rising, falling) = if power == 2.0 {
         let rising = x * x * F::c(1.0 / midpoint);
         (
@@ -123,6 +134,7 @@ pub(in crate::step) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) ->
         let scale = F::c(1.0 / (1.0 - midpoint).powf(power - 1.0));
         (rising, powered(rest, power).fnma(scale, one))
     };
+    // d = d_min + y (d_max - d_min)
     let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
     y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
 }

@@ -36,6 +36,7 @@ pub(in crate::step) fn placed<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) 
     Placed {
         point: sites::position(w, mount),
         reference: sites::reference(w, mount),
+        // R(body) R(mount)
         rotation: match mount.body {
             Some(body) => {
                 let carrier = &w.rotation[body];
@@ -54,13 +55,16 @@ pub(in crate::step) fn of_frames<C: Cx>(
     frames: &Frames<<C::F as Num>::Real>,
 ) -> Found<C::F> {
     let mounts = [&frames.first, &frames.second];
+    // r = x₁ - x₂, reference points on their own: in `f32` far positions are rounded
     let first = placed(&b.work, mounts[0]);
     let second = placed(&b.work, mounts[1]);
     let apart = (first.point - second.point) + (first.reference - second.reference);
     let mut found = Found::at(&apart.0);
+    // J̇ q̇ = ẍ₁ - ẍ₂ at q̈ = 0
     let one = moving(m, &b.work, mounts[0], &first);
     let other = moving(m, &b.work, mounts[1], &second);
     found.swing[..3].copy_from_slice(&*(one.acceleration[LINEAR] - other.acceleration[LINEAR]));
+    // r = s v with (v, w) = q₂⁻¹ q₁, and its J̇ q̇. The Jacobian needs ½ s
     let turned = frames.torque_scale.map(|scale| {
         let quat = between(&first.rotation, &second.rotation);
         let Found { position, swing } = &mut found;
@@ -73,6 +77,7 @@ pub(in crate::step) fn of_frames<C: Cx>(
         (scale * C::F::c(0.5), quat)
     });
     let w = &mut b.work;
+    // J: the first frame's velocity less the second's, of those that the dof carries
     for (column, &dof) in tie.dofs.iter().enumerate() {
         let Spatial([linear, angular]) = w.motion[dof];
         let moves = |mount: &Mount<<C::F as Num>::Real>| carries(m, mount.body, dof);
@@ -85,6 +90,7 @@ pub(in crate::step) fn of_frames<C: Cx>(
                 continue;
             }
             let sign = C::F::c(sign);
+            // ẋ = v + ω × x of the frame's origin, per unit of q̇
             let moved = angular.cross_add(point, linear);
             for i in 0..3 {
                 let place = tie.jacobian(i).start + column;
@@ -92,6 +98,7 @@ pub(in crate::step) fn of_frames<C: Cx>(
             }
             axis = angular.scale_add(sign, axis);
         }
+        // ½ s (w a + a × v) with a = R₂ᵀ (ω₁ - ω₂)
         if let Some((scale, [x, y, z, real])) = turned {
             let axis = second.rotation.transpose_mul(axis);
             let rate = axis.cross_add(Vec3([x, y, z]), axis * real) * scale;
@@ -117,6 +124,7 @@ fn moving<F: Num>(
     mount: &Mount<F::Real>,
     placed: &Placed<F>,
 ) -> Moving<F> {
+    // a frame of the world rests
     let Some(body) = mount.body else {
         return Moving {
             omega: Vec3::zero(),
@@ -129,6 +137,7 @@ fn moving<F: Num>(
         Motion::Free => placed.point,
         _ => placed.point - w.origin[body],
     };
+    // a + α × r + ω × (ω × r)
     let linear = point_acceleration(acceleration, omega, arm);
     Moving {
         omega,
@@ -141,8 +150,10 @@ fn moving<F: Num>(
 fn turning<F: Num>(axes: &Mat3<F>, one: &Moving<F>, other: &Moving<F>, quat: [F; 4]) -> Vec3<F> {
     let [x, y, z, real] = quat;
     let half = F::c(0.5);
+    // ω₁ - ω₂, and R₂ ȧ = α₁ - α₂ - ω₂ × (ω₁ - ω₂)
     let spin = one.omega - other.omega;
     let swung = (one.acceleration[ANGULAR] - other.acceleration[ANGULAR]) - other.omega.cross(spin);
+    // ½ (w ȧ + ȧ × v - ½ |a|² v)
     let rate = axes.transpose_mul(swung);
     let twice = rate.cross_add(Vec3([x, y, z]), rate * real);
     Vec3([x, y, z]).scale_add(-(spin.dot(spin) * half), twice) * half
@@ -156,15 +167,18 @@ pub(in crate::step) fn torque<F: Num>(
     scale: F::Real,
     force: Vec3<F>,
 ) -> Vec3<F> {
+    // q₂⁻¹ q₁ = (v, w), as in `of_frames`
     let first = sites::axes(w, &frames.first);
     let second = sites::axes(w, &frames.second);
     let [x, y, z, real] = between(&first, &second);
+    // w f + v × f in the axes of the second frame, then R₂ ½ s
     let own = Vec3([x, y, z]).cross_add(force, force * real);
     second.mul_add(own * (F::k(scale) * F::c(0.5)), Vec3::zero())
 }
 
 /// Does a dof move a body?
 pub(in crate::step) fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: usize) -> bool {
+    // a dof moves what its body carries: from the body towards the root
     let mut next = body;
     while let Some(body) = next {
         if m.bodies[body].dofs().contains(&dof) {
@@ -180,6 +194,7 @@ pub(in crate::step) fn carries<R>(m: &Constants<R>, body: Option<usize>, dof: us
 /// Of the four ways to divide by one of its entries, the one with the largest is taken (Shepperd 1978).
 #[inline(always)]
 pub(in crate::step) fn between<F: Num>(a: &Mat3<F>, b: &Mat3<F>) -> [F; 4] {
+    // entries of R = R(b)ᵀ R(a), their symmetric and their antisymmetric parts
     let r = |i: usize, j: usize| b[i].dot(a[j]);
     let (one, two) = (F::c(1.0), F::c(2.0));
     let [xx, yy, zz] = [r(0, 0), r(1, 1), r(2, 2)];
@@ -204,13 +219,16 @@ pub(in crate::step) fn between<F: Num>(a: &Mat3<F>, b: &Mat3<F>) -> [F; 4] {
             [Some(turns[0]), Some(turns[1]), Some(turns[2]), None],
         ),
     ];
+    // w first, then z, y, x where their square is larger
     let mut best = ways[3].0;
     let mut quat = [F::c(0.0); 4];
     for (k, (square, products)) in ways.into_iter().rev().enumerate() {
+        // twice the entry. The largest is at least 1, so `safe` bounds only ways that are not taken
         let largest = (square + one).max(F::c(0.0)).sqrt();
         let safe = largest.max(F::c(1e-6));
         let scale = one.div(two * safe);
         let better = best.lt(square);
+        // the entry itself, and the others from their products with it
         for i in 0..4 {
             let entry = match products[i] {
                 None => largest * F::c(0.5),

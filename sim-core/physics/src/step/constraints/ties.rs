@@ -57,9 +57,11 @@ impl Stage for Ties {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let mut row = m.joint_rows();
         let of_frames = |tie: &Tie<_>| matches!(tie.measure, Measure::Frames(_));
+        // J̇ q̇ of frames needs the accelerations of bodies at q̈ = 0, without gravity
         if m.ties.iter().any(of_frames) {
             accelerations_at_rest(cx, m, b, Vec3::zero());
         }
+        // rows of ties come after those of joints
         for tie in &m.ties {
             let found = measure(cx, m, b, tie);
             write_rows(cx, b, tie, row, &found);
@@ -96,21 +98,25 @@ fn measure<C: Cx>(
     b: &mut BlockOf<C>,
     tie: &Tie<<C::F as Num>::Real>,
 ) -> Found<C::F> {
+    // a dof that has no part in a measure keeps 0
     let jacobian = tie.jacobian(0).start..tie.jacobian(tie.rows - 1).end;
     b.work.row_jacobian[jacobian].fill(C::F::c(0.0));
     match &tie.measure {
         Measure::Lengths(lengths) => {
             let length = of_lengths(cx, m, b, tie, lengths);
             match tie.law {
+                // dry friction acts at every length
                 TieLaw::Friction(_) => Found::at(&[]),
                 TieLaw::Equality(_) | TieLaw::Range(_) => Found::at(&[length]),
             }
         }
         Measure::Angle(coord, _) => {
+            // |θ| and its axis, to which `write_rows` gives the sign of the bound
             let turn = quat::log(read_quat(cx, &b.joint_q, *coord));
             let angle = turn.dot(turn).sqrt();
             // at rest MuJoCo's axis is x
             let still = angle.lt(C::F::c(1e-15));
+            // a select: lanes at rest divide by 1
             let inverse = C::F::c(1.0).div(C::F::select(still, C::F::c(1.0), angle));
             for i in 0..3 {
                 let rest = C::F::c(if i == 0 { 1.0 } else { 0.0 });
@@ -149,6 +155,7 @@ fn of_lengths<C: Cx>(
     lengths: &Lengths<<C::F as Num>::Real>,
 ) -> C::F {
     let [first, second] = lengths.offsets.map(C::F::k);
+    // l₁ - o₁ and l₂ - o₂
     let own = length(cx, m, b, &lengths.first) - first;
     let other = length(cx, m, b, &lengths.second) - second;
     // p and p' by Horner's rule
@@ -157,11 +164,13 @@ fn of_lengths<C: Cx>(
         slope = slope.fma(other, value);
         value = value.fma(other, C::F::k(*coefficient));
     }
+    // a dof may be in both lengths, so entries are added up
     let mut add = |dof: usize, x: C::F| {
         let column = tie.dofs.iter().position(|&own| own == dof);
         let place = tie.first + column.unwrap_or_default();
         b.work.row_jacobian[place] = b.work.row_jacobian[place] + x;
     };
+    // J = ∂l₁ - p' ∂l₂
     for term in &lengths.first {
         add(term.dof, C::F::k(term.coefficient));
     }
@@ -182,6 +191,7 @@ fn of_free<F: Num>(
     debug_assert_eq!(tie.dofs[0], m.bodies[body].dof);
     // the frame's origin is kept relative to the centre of mass
     let (arm, rotation) = (w.origin[body], w.rotation[body]);
+    // rows of v' = v + ω × o, then of ω' = Rᵀ ω
     for i in 0..3 {
         let mut axis = Vec3::zero();
         axis[i] = F::c(1.0);
@@ -193,6 +203,7 @@ fn of_free<F: Num>(
             w.row_jacobian[angular + 3 + k] = rotation[i][k];
         }
     }
+    // J̇ q̇ = ω × (ω × o) of the origin, and 0 of the rotation
     let omega = w.velocity[body][ANGULAR];
     let mut found = Found::at(&[]);
     found.swing[..3].copy_from_slice(&*omega.cross(omega.cross(arm)));
@@ -210,10 +221,12 @@ fn write_rows<C: Cx>(
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut position = found.position;
+    // in which worlds it acts: an equality that is on, dry friction always, a range past a bound
     let active = match tie.law {
         TieLaw::Equality(place) => Some(C::F::c(0.5).lt(b.eq_active[place])),
         TieLaw::Friction(_) => None,
         TieLaw::Range([lower, upper]) => {
+            // r is the distance to the nearer bound, and J its derivative
             let (above, below) = (position[0] - C::F::k(lower), C::F::k(upper) - position[0]);
             let side = C::F::select(above.lt(below), one, -one);
             for entry in &mut b.work.row_jacobian[tie.jacobian(0)] {
@@ -223,6 +236,7 @@ fn write_rows<C: Cx>(
             Some(position[0].lt(zero))
         }
     };
+    // several rows have the impedance of |r|
     let mut size = position[0];
     if tie.rows > 1 {
         let mut square = zero;
@@ -232,11 +246,13 @@ fn write_rows<C: Cx>(
         size = square.sqrt();
     }
     let d = impedance(&tie.soft.impedance, size);
+    // v = J q̇
     for k in 0..tie.rows {
         let mut velocity = zero;
         for (entry, &dof) in b.work.row_jacobian[tie.jacobian(k)].iter().zip(&tie.dofs) {
             velocity = entry.fma(cx.get(&b.joint_qd[dof]), velocity);
         }
+        // D = d / ((1 - d) w), with the w of translations or of rotations
         let inverse_weight = match k {
             0..3 => tie.soft.inverse_weight,
             _ => tie.turning_weight,
@@ -245,8 +261,10 @@ fn write_rows<C: Cx>(
         if !<<C::F as Num>::Real as Real>::DOUBLE {
             weight = weight.min(C::F::c(WEIGHT_MAX));
         }
+        // aref = -b v - k d r - J̇ q̇
         let spring = C::F::k(tie.soft.stiffness) * d * position[k];
         let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - found.swing[k];
+        // by mask: other worlds of the block may act
         if let Some(active) = active {
             weight = C::F::select(active, weight, zero);
             aref = C::F::select(active, aref, zero);

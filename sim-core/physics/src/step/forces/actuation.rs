@@ -67,7 +67,6 @@ impl Stage for JointTorque {
 /// Writes `smooth_force`: applied and drive forces, less damping and bias.
 #[inline(always)]
 fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    // applied and drive forces
     for body in &m.bodies {
         let torques = torques(cx, m, b, body);
         b.work.smooth_force[body.dofs()].copy_from_slice(&torques[..body.motion.dofs()]);
@@ -109,7 +108,6 @@ fn torques<C: Cx>(
     let first = body.dof;
     match body.motion {
         Motion::Revolute | Motion::Prismatic => {
-            // q* - q
             let target = command_of::<C>(m, b, Kind::Position, first);
             let error = target - cx.get(&b.joint_q[body.coord]);
             torques[0] = joint_force(cx, m, b, first, error);

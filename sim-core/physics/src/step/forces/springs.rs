@@ -93,7 +93,6 @@ impl Stage for Passive {
                 passive[d] = passive[d] + b.work.joint_force[d];
             }
         }
-        // drag of the medium
         if !m.drags.is_empty() {
             fluid::forces(m, &mut b.work);
             for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {

@@ -25,7 +25,7 @@ pub(in crate::step) fn of_part<F: Num>(
 ) -> (F, [F; 6]) {
     let mass = param(m, params, Param::BodyMass, part.link, part.mass);
     let inertia = match (m.varying.first(Param::BodyInertia), part.link_axes) {
-        // a client gives it in the link's axes: R I Rᵀ turns it into the body's
+        // a client gives it in the link's axes: R I Rᵀ is the same in the body's
         (Some(first), Some(axes)) => {
             let own = std::array::from_fn(|i| params[first + 6 * part.link + i]);
             turned(&Mat3::constant(axes), own)

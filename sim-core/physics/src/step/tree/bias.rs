@@ -124,7 +124,7 @@ fn carried<F: Num>(
             let twice = own[LINEAR] * F::c(2.0);
             Spatial([omega.cross_add(twice, point), carrier[ANGULAR]])
         }
-        // α + ω × S q̇: the carrier turns the joint's axis
+        // α + ω × S q̇: the carrier rotates the joint's axis
         _ => Spatial([point, omega.cross_add(own[ANGULAR], carrier[ANGULAR])]),
     }
 }

@@ -138,7 +138,7 @@ fn moved<C: Cx>(
     let (c, d, w) = (body.coord, body.dof, &mut b.work);
     match body.motion {
         Motion::Revolute => {
-            // E Rz(q) turns x and y in their plane and leaves z, S = (p × z, z)
+            // E Rz(q) rotates x and y in their plane and leaves z, S = (p × z, z)
             let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
             w.motion[d] = Spatial([origin.cross(z), z]);
             let columns = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
