@@ -212,10 +212,10 @@ impl<'a, C: Cx> Contact<'a, C> {
         // kind after kind, each selected where it is that of the pair
         let mut d = impedance(&m.contacts.impedances.all[kinds[0]], position);
         if let [_, others @ ..] = &kinds[..] {
-            let own = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
+            let kind_of_pair = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
             for &kind in others {
                 // places are whole, so within a half they are equal
-                let is_it = (own - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
+                let is_it = (kind_of_pair - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
                 d = C::F::select(
                     is_it,
                     impedance(&m.contacts.impedances.all[kind], position),

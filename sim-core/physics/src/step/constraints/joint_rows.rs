@@ -37,8 +37,8 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     for equality in &m.equalities {
         let multiplier = C::F::k(equality.multiplier);
         let (f, l) = (equality.follower, equality.leader);
-        let (led, own) = (m.dofs[l].coord, m.dofs[f].coord);
-        let position = multiplier.fnma(cx.get(&b.joint_q[led]), cx.get(&b.joint_q[own]))
+        let (leading, following) = (m.dofs[l].coord, m.dofs[f].coord);
+        let position = multiplier.fnma(cx.get(&b.joint_q[leading]), cx.get(&b.joint_q[following]))
             - C::F::k(equality.offset);
         let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
         let (weight, aref) = soft_row(&equality.soft, position, velocity);

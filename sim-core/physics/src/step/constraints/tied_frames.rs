@@ -8,7 +8,7 @@
 //!
 //! A row's reference acceleration is that of r̈ = J q̈ + J̇ q̇ (MuJoCo 3.17).
 
-use super::ties::Found;
+use super::ties::Measured;
 use crate::arrays::Workspace;
 use crate::constants::site::Mount;
 use crate::constants::ties::{Frames, Tie};
@@ -32,7 +32,7 @@ pub(in crate::step) struct Placed<F> {
 
 #[inline(always)]
 pub(in crate::step) fn placed<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Placed<F> {
-    let own = Mat3::constant(mount.rotation);
+    let local = Mat3::constant(mount.rotation);
     Placed {
         point: sites::position(w, mount),
         reference: sites::reference(w, mount),
@@ -40,9 +40,9 @@ pub(in crate::step) fn placed<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) 
         rotation: match mount.body {
             Some(body) => {
                 let carrier = &w.rotation[body];
-                Mat3([carrier * own[0], carrier * own[1], carrier * own[2]])
+                Mat3([carrier * local[0], carrier * local[1], carrier * local[2]])
             }
-            None => own,
+            None => local,
         },
     }
 }
@@ -53,21 +53,21 @@ pub(in crate::step) fn of_frames<C: Cx>(
     b: &mut BlockOf<C>,
     tie: &Tie<<C::F as Num>::Real>,
     frames: &Frames<<C::F as Num>::Real>,
-) -> Found<C::F> {
+) -> Measured<C::F> {
     let mounts = [&frames.first, &frames.second];
     // r = x₁ - x₂, reference points on their own: in `f32` far positions are rounded
     let first = placed(&b.work, mounts[0]);
     let second = placed(&b.work, mounts[1]);
     let apart = (first.point - second.point) + (first.reference - second.reference);
-    let mut found = Found::at(&apart.0);
+    let mut measured = Measured::at(&apart.0);
     // J̇ q̇ = ẍ₁ - ẍ₂ at q̈ = 0
     let one = moving(m, &b.work, mounts[0], &first);
     let other = moving(m, &b.work, mounts[1], &second);
-    found.swing[..3].copy_from_slice(&*(one.acceleration[LINEAR] - other.acceleration[LINEAR]));
+    measured.swing[..3].copy_from_slice(&*(one.acceleration[LINEAR] - other.acceleration[LINEAR]));
     // r = s v with (v, w) = q₂⁻¹ q₁, and its J̇ q̇. The Jacobian needs ½ s
     let turned = frames.torque_scale.map(|scale| {
         let quat = between(&first.rotation, &second.rotation);
-        let Found { position, swing } = &mut found;
+        let Measured { position, swing } = &mut measured;
         let scale = C::F::k(scale);
         let turning = turning(&second.rotation, &one, &other, quat);
         for i in 0..3 {
@@ -107,7 +107,7 @@ pub(in crate::step) fn of_frames<C: Cx>(
             }
         }
     }
-    found
+    measured
 }
 
 /// How a frame moves at zero joint acceleration.
@@ -172,8 +172,8 @@ pub(in crate::step) fn torque<F: Num>(
     let second = sites::axes(w, &frames.second);
     let [x, y, z, real] = between(&first, &second);
     // w f + v × f in the axes of the second frame, then R₂ ½ s
-    let own = Vec3([x, y, z]).cross_add(force, force * real);
-    second.mul_add(own * (F::k(scale) * F::c(0.5)), Vec3::zero())
+    let local_torque = Vec3([x, y, z]).cross_add(force, force * real);
+    second.mul_add(local_torque * (F::k(scale) * F::c(0.5)), Vec3::zero())
 }
 
 /// Does a dof move a body?

@@ -63,27 +63,27 @@ impl Stage for Ties {
         }
         // rows of ties come after those of joints
         for tie in &m.ties {
-            let found = measure(cx, m, b, tie);
-            write_rows(cx, b, tie, row, &found);
+            let measured = measure(cx, m, b, tie);
+            write_rows(cx, b, tie, row, &measured);
             row += tie.rows;
         }
     }
 }
 
 /// What a tie measures now.
-pub(in crate::step) struct Found<F> {
+pub(in crate::step) struct Measured<F> {
     /// Of each row.
     pub position: [F; ROWS_MAX],
     /// J̇ q̇
     pub swing: [F; ROWS_MAX],
 }
 
-impl<F: Num> Found<F> {
+impl<F: Num> Measured<F> {
     #[inline(always)]
-    pub(in crate::step) fn at(positions: &[F]) -> Found<F> {
+    pub(in crate::step) fn at(positions: &[F]) -> Measured<F> {
         let mut position = [F::c(0.0); ROWS_MAX];
         position[..positions.len()].copy_from_slice(positions);
-        Found {
+        Measured {
             position,
             swing: [F::c(0.0); ROWS_MAX],
         }
@@ -97,7 +97,7 @@ fn measure<C: Cx>(
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     tie: &Tie<<C::F as Num>::Real>,
-) -> Found<C::F> {
+) -> Measured<C::F> {
     // a dof that has no part in a measure keeps 0
     let jacobian = tie.jacobian(0).start..tie.jacobian(tie.rows - 1).end;
     b.work.row_jacobian[jacobian].fill(C::F::c(0.0));
@@ -106,8 +106,8 @@ fn measure<C: Cx>(
             let length = of_lengths(cx, m, b, tie, lengths);
             match tie.law {
                 // dry friction acts at every length
-                TieLaw::Friction(_) => Found::at(&[]),
-                TieLaw::Equality(_) | TieLaw::Range(_) => Found::at(&[length]),
+                TieLaw::Friction(_) => Measured::at(&[]),
+                TieLaw::Equality(_) | TieLaw::Range(_) => Measured::at(&[length]),
             }
         }
         Measure::Angle(coord, _) => {
@@ -123,7 +123,7 @@ fn measure<C: Cx>(
                 let axis = C::F::select(still, rest, turn[i] * inverse);
                 b.work.row_jacobian[tie.first + i] = axis;
             }
-            Found::at(&[angle])
+            Measured::at(&[angle])
         }
         Measure::Free(body) => of_free(m, &mut b.work, tie, *body),
         Measure::Frames(frames) => of_frames::<C>(m, b, tie, frames),
@@ -156,17 +156,17 @@ fn of_lengths<C: Cx>(
 ) -> C::F {
     let [first, second] = lengths.offsets.map(C::F::k);
     // l₁ - o₁ and l₂ - o₂
-    let own = length(cx, m, b, &lengths.first) - first;
-    let other = length(cx, m, b, &lengths.second) - second;
+    let first_change = length(cx, m, b, &lengths.first) - first;
+    let second_change = length(cx, m, b, &lengths.second) - second;
     // p and p' by Horner's rule
     let (mut value, mut slope) = (C::F::c(0.0), C::F::c(0.0));
     for coefficient in lengths.polynomial.iter().rev() {
-        slope = slope.fma(other, value);
-        value = value.fma(other, C::F::k(*coefficient));
+        slope = slope.fma(second_change, value);
+        value = value.fma(second_change, C::F::k(*coefficient));
     }
     // a dof may be in both lengths, so entries are added up
     let mut add = |dof: usize, x: C::F| {
-        let column = tie.dofs.iter().position(|&own| own == dof);
+        let column = tie.dofs.iter().position(|&tied| tied == dof);
         let place = tie.first + column.unwrap_or_default();
         b.work.row_jacobian[place] = b.work.row_jacobian[place] + x;
     };
@@ -177,7 +177,7 @@ fn of_lengths<C: Cx>(
     for term in &lengths.second {
         add(term.dof, -(slope * C::F::k(term.coefficient)));
     }
-    own - value
+    first_change - value
 }
 
 /// MuJoCo's velocities of a free body from ours, and the acceleration of its frame's origin that our J q̈ lacks.
@@ -187,7 +187,7 @@ fn of_free<F: Num>(
     w: &mut Workspace<F>,
     tie: &Tie<F::Real>,
     body: usize,
-) -> Found<F> {
+) -> Measured<F> {
     debug_assert_eq!(tie.dofs[0], m.bodies[body].dof);
     // the frame's origin is kept relative to the centre of mass
     let (arm, rotation) = (w.origin[body], w.rotation[body]);
@@ -205,9 +205,9 @@ fn of_free<F: Num>(
     }
     // J̇ q̇ = ω × (ω × o) of the origin, and 0 of the rotation
     let omega = w.velocity[body][ANGULAR];
-    let mut found = Found::at(&[]);
-    found.swing[..3].copy_from_slice(&*omega.cross(omega.cross(arm)));
-    found
+    let mut measured = Measured::at(&[]);
+    measured.swing[..3].copy_from_slice(&*omega.cross(omega.cross(arm)));
+    measured
 }
 
 /// Writes D and aref of the rows of a tie, and gives the Jacobian of a range the sign of the bound that is nearer.
@@ -217,10 +217,10 @@ fn write_rows<C: Cx>(
     b: &mut BlockOf<C>,
     tie: &Tie<<C::F as Num>::Real>,
     row: usize,
-    found: &Found<C::F>,
+    measured: &Measured<C::F>,
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-    let mut position = found.position;
+    let mut position = measured.position;
     // in which worlds it acts: an equality that is on, dry friction always, a range past a bound
     let active = match tie.law {
         TieLaw::Equality(place) => Some(C::F::c(0.5).lt(b.eq_active[place])),
@@ -263,7 +263,7 @@ fn write_rows<C: Cx>(
         }
         // aref = -b v - k d r - J̇ q̇
         let spring = C::F::k(tie.soft.stiffness) * d * position[k];
-        let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - found.swing[k];
+        let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - measured.swing[k];
         // by mask: other worlds of the block may act
         if let Some(active) = active {
             weight = C::F::select(active, weight, zero);

@@ -230,18 +230,18 @@ fn law<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     which: Param,
-    (k, own): (usize, [F::Real; 3]),
+    (k, fixed): (usize, [F::Real; 3]),
     [length, velocity]: [F; 2],
 ) -> F {
     // factors that are 0 in the model may vary from world to world
     let varies = m.varying.first(which).is_some();
-    let mut sum = param(m, params, which, 3 * k, own[0]);
+    let mut sum = param(m, params, which, 3 * k, fixed[0]);
     // most actuators have no such term
-    if varies || own[1].to_f64() != 0.0 {
-        sum = length.fma(param(m, params, which, 3 * k + 1, own[1]), sum);
+    if varies || fixed[1].to_f64() != 0.0 {
+        sum = length.fma(param(m, params, which, 3 * k + 1, fixed[1]), sum);
     }
-    if varies || own[2].to_f64() != 0.0 {
-        sum = velocity.fma(param(m, params, which, 3 * k + 2, own[2]), sum);
+    if varies || fixed[2].to_f64() != 0.0 {
+        sum = velocity.fma(param(m, params, which, 3 * k + 2, fixed[2]), sum);
     }
     sum
 }
@@ -263,11 +263,11 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         let actuator = &m.actuators.all[k];
         // ∂force/∂v = g₂ input + b₂
         let input = input(cx, b, actuator, k);
-        let of = |which: Param, own: [<C::F as Num>::Real; 3]| {
-            param(m, &b.params, which, 3 * k + 2, own[2])
+        let rate_factor = |which: Param, fixed: [<C::F as Num>::Real; 3]| {
+            param(m, &b.params, which, 3 * k + 2, fixed[2])
         };
-        let gain = of(Param::ActuatorGain, actuator.gain);
-        let slope = gain.fma(input, of(Param::ActuatorBias, actuator.bias));
+        let gain = rate_factor(Param::ActuatorGain, actuator.gain);
+        let slope = gain.fma(input, rate_factor(Param::ActuatorBias, actuator.bias));
         let mut damping = -(slope * dt);
         // a force at its bound does not change with the velocity: no damping in that world
         if let Some([least, most]) = actuator.force_range {

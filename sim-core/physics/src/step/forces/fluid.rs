@@ -53,7 +53,7 @@ impl Stage for Fluid {
 pub(in crate::step) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     link_forces::clear(w);
     for drag in &m.drags {
-        let flow = Flow::of(w, drag);
+        let flow = Flow::around(w, drag);
         let (mut force, mut torque) = (Vec3::zero(), Vec3::zero());
         // f = -(c + d |v|) v and n = -(c + d |ω|) ω, axis by axis
         for i in 0..3 {
@@ -80,7 +80,7 @@ struct Flow<F> {
 
 impl<F: Num> Flow<F> {
     #[inline(always)]
-    fn of(w: &Workspace<F>, drag: &Drag<F::Real>) -> Flow<F> {
+    fn around(w: &Workspace<F>, drag: &Drag<F::Real>) -> Flow<F> {
         let (rotation, velocity) = (&w.rotation[drag.body], w.velocity[drag.body]);
         // centre of mass p from the reference point, and its velocity v + ω × p - wind
         let point = rotation.mul_add(Vec3::constant(drag.center), w.origin[drag.body]);
@@ -109,7 +109,7 @@ impl<F: Num> Flow<F> {
 pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
     for drag in &m.drags {
-        let flow = Flow::of(w, drag);
+        let flow = Flow::around(w, drag);
         let tree = m.bodies[drag.body].tree;
         // dofs on the path of the body's last dof to the root: all that move the link
         let last = m.bodies[drag.body].dofs().end - 1;
@@ -154,14 +154,14 @@ fn add_row<C: Cx>(
     x: C::F,
     swing: Option<C::F>,
 ) {
-    let of = |dof: usize| {
+    let entries = |dof: usize| {
         let (start, end) = m.dofs[dof].entries;
         &m.mass_entries[start..end]
     };
     // each pair of dofs once: a dof with those before it on the path
-    for row in of(last) {
+    for row in entries(last) {
         let scaled = w.step[row.other] * x;
-        for entry in of(row.other) {
+        for entry in entries(row.other) {
             let place = &mut w.mass_matrix[entry.place];
             *place = scaled.fma(w.step[entry.other], *place);
         }

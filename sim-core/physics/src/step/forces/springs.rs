@@ -95,8 +95,8 @@ impl Stage for Passive {
         }
         if !m.drags.is_empty() {
             fluid::forces(m, &mut b.work);
-            for (force, own) in passive.iter_mut().zip(&b.work.joint_force) {
-                *force = *force + *own;
+            for (force, drag) in passive.iter_mut().zip(&b.work.joint_force) {
+                *force = *force + *drag;
             }
         }
         b.work.passive_force = passive;

@@ -44,15 +44,15 @@ pub(in crate::step) fn measure<C: Cx>(
             quat::log(turned).dot(gear)
         }
         LengthKind::Free { body, in_parent } => {
-            let own = &mut b.work;
+            let work = &mut b.work;
             // R gear, or the gear itself where it is in world axes
             let torque = match in_parent {
                 true => about,
-                false => own.rotation[*body] * about,
+                false => work.rotation[*body] * about,
             };
             // at the centre of mass; the frame's origin is kept relative to it
-            let torque = own.origin[*body].cross_add(along, torque);
-            moments(own, length).copy_from_slice(&Spatial([along, torque]).scalars());
+            let torque = work.origin[*body].cross_add(along, torque);
+            moments(work, length).copy_from_slice(&Spatial([along, torque]).scalars());
             C::F::c(0.0)
         }
         LengthKind::Site(sites) => of_sites(m, &mut b.work, length, sites, [along, about]),

@@ -238,10 +238,10 @@ fn set_free_velocity<C: Cx>(
     body: &Body<<C::F as Num>::Real>,
     velocity: &[C::F],
 ) {
-    let [linear, own] = halves(velocity);
+    let [linear, local_spin] = halves(velocity);
     // ω = R ω' and v = v' + ω × R c, with the rotation that `go` wrote
     let rotation = quat::matrix(read_quat(cx, &b.joint_q, body.coord + 3));
-    let spin = rotation * own;
+    let spin = rotation * local_spin;
     let center = spin.cross_add(rotation * Vec3::constant(body.center), linear);
     for i in 0..3 {
         cx.set(&mut b.joint_qd[body.dof + i], center[i]);

@@ -293,9 +293,9 @@ fn rotated_inertia<F: Num>(
         let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
         let swing = arm.cross(v.cross(arm));
         let (mass, inertia) = masses::of_part(m, params, part);
-        let own = swing.scale_add(mass, symmetric(inertia, v));
+        let product = swing.scale_add(mass, symmetric(inertia, v));
         let scale = masses::scale(m, params, part.link);
-        sum = own.scale_add(scale.unwrap_or(F::c(1.0)), sum);
+        sum = product.scale_add(scale.unwrap_or(F::c(1.0)), sum);
     }
     rotation * sum
 }
@@ -323,18 +323,18 @@ fn integrate_free<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: 
     let pull = (linear - angular.cross(arm)) - spin.cross(swing);
     // v += h a, and ω' = Rᵀ ω + h Rᵀ α
     let origin = pull.scale_add(dt, origin);
-    let own = rotation
+    let local_spin = rotation
         .transpose_mul(angular)
         .scale_add(dt, rotation.transpose_mul(spin));
     // p += h v, R' = R exp(h ω')
     for i in 0..3 {
         add_compensated(cx, &mut joint_q[c + i], &mut rests[c + i], origin[i], dt);
     }
-    let turned = quat::turned(read_quat(cx, joint_q, c + 3), own, dt);
+    let turned = quat::turned(read_quat(cx, joint_q, c + 3), local_spin, dt);
     write_quat(cx, joint_q, c + 3, turned);
     // back to ours at the new rotation: ω = R' ω' and v(c) = v + ω × R' c
     let rotation = quat::matrix(turned);
-    let spin = rotation * own;
+    let spin = rotation * local_spin;
     let velocity = origin + spin.cross(rotation * Vec3::constant(body.center));
     for i in 0..3 {
         cx.set(&mut joint_qd[d + i], velocity[i]);

@@ -27,8 +27,8 @@ pub(in crate::step) fn of_part<F: Num>(
     let inertia = match (m.varying.first(Param::BodyInertia), part.link_axes) {
         // a client gives it in the link's axes: R I Rᵀ is the same in the body's
         (Some(first), Some(axes)) => {
-            let own = std::array::from_fn(|i| params[first + 6 * part.link + i]);
-            turned(&Mat3::constant(axes), own)
+            let link_inertia = std::array::from_fn(|i| params[first + 6 * part.link + i]);
+            turned(&Mat3::constant(axes), link_inertia)
         }
         _ => part.inertia.map(F::k),
     };
@@ -54,10 +54,10 @@ pub(in crate::step) fn mass<F: Num>(
     link: usize,
     fixed: F::Real,
 ) -> F {
-    let own = param(m, params, Param::BodyMass, link, fixed);
+    let unscaled = param(m, params, Param::BodyMass, link, fixed);
     match scale(m, params, link) {
-        Some(scale) => own * scale,
-        None => own,
+        Some(scale) => unscaled * scale,
+        None => unscaled,
     }
 }
 
@@ -70,7 +70,7 @@ pub(in crate::step) fn inertia_times<F: Num, V>(
     v: Vec3<F>,
 ) -> Vec3<F> {
     let w: &Workspace<F> = &b.work;
-    let own = match m.varying.first(Param::BodyInertia) {
+    let product = match m.varying.first(Param::BodyInertia) {
         // given in the link's axes: R I Rᵀ v
         Some(first) => {
             let turn: Mat3<F> = axes(w, &body.frame);
@@ -91,8 +91,8 @@ pub(in crate::step) fn inertia_times<F: Num, V>(
     };
     // the scale of a mass multiplies its inertia, too
     match scale(m, &b.params, body.link) {
-        Some(scale) => own * scale,
-        None => own,
+        Some(scale) => product * scale,
+        None => product,
     }
 }
 

@@ -92,27 +92,33 @@ fn accelerate<C: Cx>(
 ) {
     let body = &m.bodies[k];
     // v(b) = v(parent) + S q̇, and the acceleration at q̈ = 0. A root's point has that of the base
-    let own = joint_velocity(cx, b, body);
+    let relative = joint_velocity(cx, b, body);
     let w = &mut b.work;
     let (velocity, acceleration) = match body.parent {
         Some(parent) => {
             let v = w.velocity[parent];
-            let carried = carried(body.motion, w.rest_acceleration[parent], v, own, w.arm[k]);
-            (v + own, carried)
+            let carried = carried(
+                body.motion,
+                w.rest_acceleration[parent],
+                v,
+                relative,
+                w.arm[k],
+            );
+            (v + relative, carried)
         }
-        None => (own, Spatial([base, Vec3::zero()])),
+        None => (relative, Spatial([base, Vec3::zero()])),
     };
     w.velocity[k] = velocity;
     w.rest_acceleration[k] = acceleration;
 }
 
-/// Acceleration of a body at `arm` from the point of its carrier, whose own and whose velocity are given.
+/// Acceleration of a body at `arm` from the point of its carrier, whose acceleration and velocity are given. `relative` is S q̇.
 #[inline(always)]
 fn carried<F: Num>(
     motion: Motion,
     carrier: Spatial<F>,
     velocity: Spatial<F>,
-    own: Spatial<F>,
+    relative: Spatial<F>,
     arm: Vec3<F>,
 ) -> Spatial<F> {
     // a + α × r + ω × (ω × r), with ω and α of the carrier
@@ -121,11 +127,11 @@ fn carried<F: Num>(
     match motion {
         // Coriolis: 2 ω × z q̇ of a point that slides
         Motion::Prismatic => {
-            let twice = own[LINEAR] * F::c(2.0);
+            let twice = relative[LINEAR] * F::c(2.0);
             Spatial([omega.cross_add(twice, point), carrier[ANGULAR]])
         }
         // α + ω × S q̇: the carrier rotates the joint's axis
-        _ => Spatial([point, omega.cross_add(own[ANGULAR], carrier[ANGULAR])]),
+        _ => Spatial([point, omega.cross_add(relative[ANGULAR], carrier[ANGULAR])]),
     }
 }
 
@@ -152,9 +158,9 @@ fn joint_velocity<C: Cx>(
     }
     // one axis, or the three of a ball in the order of its dofs
     let motion = &b.work.motion[body.dofs()];
-    let mut own = motion[0] * cx.get(&qd[0]);
+    let mut velocity = motion[0] * cx.get(&qd[0]);
     for d in 1..body.motion.dofs() {
-        own = motion[d].scale_add(cx.get(&qd[d]), own);
+        velocity = motion[d].scale_add(cx.get(&qd[d]), velocity);
     }
-    own
+    velocity
 }

@@ -146,8 +146,8 @@ fn add_block<F: Num>(
         // angular rows of this column: o × X (axis × o) + R X Rᵀ axis
         let torque = origin.cross_add(moved, rotation * turned);
         // linear block X, then the row of dof 3 + j: the matrix keeps its lower triangle
-        let own = m.pattern.at(first + j, first + j);
-        w.mass_matrix[own] = w.mass_matrix[own] + linear[j];
+        let diagonal = m.pattern.at(first + j, first + j);
+        w.mass_matrix[diagonal] = w.mass_matrix[diagonal] + linear[j];
         for i in 0..3 {
             let place = m.pattern.at(first + 3 + j, first + i);
             w.mass_matrix[place] = w.mass_matrix[place] + moved[i];
@@ -241,14 +241,14 @@ pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<
         }
     }
     // Gauss' elimination, then back substitution from the last row
-    let found = &mut w.minimum[first..first + 6];
+    let solution = &mut w.minimum[first..first + 6];
     eliminate(&mut system);
     for i in (0..6).rev() {
         let mut x = system[i][6];
         for j in i + 1..6 {
-            x = system[i][j].fnma(found[j], x);
+            x = system[i][j].fnma(solution[j], x);
         }
-        found[i] = x.div(system[i][i]);
+        solution[i] = x.div(system[i][i]);
     }
 }
 

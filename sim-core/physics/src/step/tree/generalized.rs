@@ -28,8 +28,8 @@ pub fn velocities<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C
         // the reference point is the centre of mass, so the origin is -r
         let linear = angular.cross_add(b.work.origin[k], linear);
         to[dof..dof + 3].copy_from_slice(&linear.0);
-        let own = b.work.rotation[k].transpose_mul(angular);
-        to[dof + 3..dof + 6].copy_from_slice(&own.0);
+        let local_spin = b.work.rotation[k].transpose_mul(angular);
+        to[dof + 3..dof + 6].copy_from_slice(&local_spin.0);
     }
 }
 
@@ -115,8 +115,8 @@ pub fn turn_forces<F: Num>(m: &Constants<F::Real>, w: &Workspace<F>, forces: &mu
         let [force, torque] = halves(&forces[dof..]);
         // the reference point is the centre of mass, so the origin is -r
         let moved = torque - w.origin[k].cross(force);
-        let own = w.rotation[k].transpose_mul(moved);
-        forces[dof + 3..dof + 6].copy_from_slice(&own.0);
+        let local_torque = w.rotation[k].transpose_mul(moved);
+        forces[dof + 3..dof + 6].copy_from_slice(&local_torque.0);
     }
 }
 

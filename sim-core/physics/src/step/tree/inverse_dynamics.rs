@@ -32,9 +32,9 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
             let mut whole = Spatial::zero();
             for part in &body.parts {
                 let massed = masses::of_part(m, &b.params, part);
-                let own = newton_euler::<C::F>(massed, part.center, state);
+                let wrench = newton_euler::<C::F>(massed, part.center, state);
                 let scale = masses::scale(m, &b.params, part.link);
-                whole = own.scale_add(scale.unwrap_or(C::F::c(1.0)), whole);
+                whole = wrench.scale_add(scale.unwrap_or(C::F::c(1.0)), whole);
             }
             whole
         } else {
@@ -102,20 +102,20 @@ pub(in crate::step) fn proper_accelerations<C: Cx>(
             Motion::Revolute => {
                 // α += z q̈ + ω × z q̇
                 let turn = z * cx.get(&b.joint_qd[d]);
-                let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(turn));
-                [carried[LINEAR], carried[ANGULAR] + own]
+                let relative = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(turn));
+                [carried[LINEAR], carried[ANGULAR] + relative]
             }
             Motion::Prismatic => {
                 // a += z q̈ + 2 ω × z q̇
                 let slide = z * (cx.get(&b.joint_qd[d]) * C::F::c(2.0));
-                let own = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(slide));
-                [carried[LINEAR] + own, carried[ANGULAR]]
+                let relative = z.scale_add(cx.get(&b.joint_qdd[d]), spin.cross(slide));
+                [carried[LINEAR] + relative, carried[ANGULAR]]
             }
             Motion::Ball => {
                 // α += R q̈ + ω × R q̇, the dofs of a ball being about its own axes
                 let turn = axes * read::<C>(cx, &b.joint_qd, d);
-                let own = axes.mul_add(read::<C>(cx, &b.joint_qdd, d), spin.cross(turn));
-                [carried[LINEAR], carried[ANGULAR] + own]
+                let relative = axes.mul_add(read::<C>(cx, &b.joint_qdd, d), spin.cross(turn));
+                [carried[LINEAR], carried[ANGULAR] + relative]
             }
             Motion::Free => {
                 // q̈ is of the centre of mass, from which the frame's origin is at -R c
@@ -149,8 +149,8 @@ fn newton_euler<F: Num>(
         axes.transpose_mul(omega),
         axes.transpose_mul(acceleration[ANGULAR]),
     );
-    let own = spin.cross_add(symmetric(inertia, spin), symmetric(inertia, turn));
-    Spatial([force, axes.mul_add(own, center.cross(force))])
+    let moment = spin.cross_add(symmetric(inertia, spin), symmetric(inertia, turn));
+    Spatial([force, axes.mul_add(moment, center.cross(force))])
 }
 
 /// Acceleration of a point of a body at `arm` from its origin: a + α × r + ω × (ω × r).

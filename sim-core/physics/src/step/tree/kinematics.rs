@@ -229,10 +229,10 @@ fn inertia<F: Num>(
     let mut sum = Inertia::zero();
     for part in &body.parts {
         let (mass, inertia) = masses::of_part(m, params, part);
-        let own = Inertia::placed(mass, part.center, inertia, rotation, origin);
+        let link_inertia = Inertia::placed(mass, part.center, inertia, rotation, origin);
         let scale = masses::scale(m, params, part.link);
-        for (sum, own) in sum.iter_mut().zip(*own) {
-            *sum = own.fma(scale.unwrap_or(F::c(1.0)), *sum);
+        for (sum, entry) in sum.iter_mut().zip(*link_inertia) {
+            *sum = entry.fma(scale.unwrap_or(F::c(1.0)), *sum);
         }
     }
     sum

@@ -47,7 +47,7 @@ impl Stage for MassMatrix {
             for (axis, i) in body.dofs().enumerate() {
                 let dof = &m.dofs[i];
                 let entries = &m.mass_entries[dof.entries.0..dof.entries.1];
-                let (own, path) = entries.split_last().expect("a dof meets itself");
+                let (last, path) = entries.split_last().expect("a dof meets itself");
                 let diagonal;
                 if body.motion == Motion::Free {
                     // S = 1: the row of Iᶜ, up to its diagonal
@@ -67,7 +67,7 @@ impl Stage for MassMatrix {
                         w.mass_matrix[entry.place] = x;
                     }
                 }
-                w.mass_matrix[own.place] = diagonal;
+                w.mass_matrix[last.place] = diagonal;
             }
             // Iᶜ(parent) += Iᶜ about the carrier's point
             if let Some(parent) = body.parent {
@@ -76,9 +76,9 @@ impl Stage for MassMatrix {
         }
         // a drive's armature is on the diagonal. That of free joints belongs to MuJoCo's velocities, so it is not
         for &j in &m.diagonal_dofs {
-            let own = m.pattern.at(j, j);
+            let diagonal = m.pattern.at(j, j);
             let armature = param(m, params, Param::JointArmature, j, m.dofs[j].armature);
-            w.mass_matrix[own] = w.mass_matrix[own] + armature;
+            w.mass_matrix[diagonal] = w.mass_matrix[diagonal] + armature;
         }
         free_joints::add_armature(m, params, w);
     }
