@@ -5,8 +5,9 @@
 //! x' = x ⊕ h Σ bₖ (vₖ, v̇ₖ)                           b = ⅙, ⅓, ⅓, ⅙
 //! ```
 //!
-//! Velocities v are MuJoCo's ([`crate::step::tree::generalized`]). ⊕ turns a quaternion by h v in the body's axes. All stages of a step run
-//! before each of the four, at xₖ. The solver starts each of the four from the accelerations of the last step.
+//! Velocities v are MuJoCo's ([`crate::step::tree::generalized`]). ⊕ rotates a quaternion by h v in the
+//! body's axes. All stages of a step run before each of the four, at xₖ. The solver starts each of the four from the
+//! accelerations of the last step.
 
 use super::semi_implicit::{activations, add_compensated, write_quat};
 use crate::arrays::Array as A;

@@ -112,8 +112,8 @@ fn accelerate<C: Cx>(
     w.rest_acceleration[k] = acceleration;
 }
 
-/// Acceleration of a body at `arm` from the point of its carrier, whose acceleration and velocity are given. The joint adds the
-/// velocity `relative`.
+/// Acceleration of a body at `arm` from the point of its carrier, whose acceleration and velocity are given. The joint
+/// adds the velocity `relative`.
 #[inline(always)]
 fn carried<F: Num>(
     motion: Motion,
