@@ -78,11 +78,11 @@ fn stiff_column<C: Cx>(
     rows: &[[C::F; 3]; 3],
     c: usize,
 ) -> [C::F; 3] {
-    let own = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
+    let column = cx.load3(t.memory.rows, r, row::JACOBIAN + 3 * c);
     let mut stiff = [C::F::c(0.0); 3];
     for i in 0..3 {
-        let along = rows[i][1].fma(own[1], rows[i][2] * own[2]);
-        stiff[i] = rows[i][0].fma(own[0], along);
+        let along = rows[i][1].fma(column[1], rows[i][2] * column[2]);
+        stiff[i] = rows[i][0].fma(column[0], along);
     }
     stiff
 }
@@ -149,8 +149,8 @@ fn assemble_turning<C: Cx>(
     }
     for (c, entries) in class.entries.iter().enumerate() {
         let (first, other) = (row::JACOBIAN + 3 * c, block + more::JACOBIAN + 3 * c);
-        let own = turning::six(cx, t, r, first, other);
-        let [a, b, d, e, f, g] = only(cx, law.times(own));
+        let column = turning::six(cx, t, r, first, other);
+        let [a, b, d, e, f, g] = only(cx, law.times(column));
         for run in entries {
             let cells = &mut hessian[run.places()];
             let (first, other) = (

@@ -5,7 +5,7 @@
 //! on its side with the smaller slope. Where no end moves, rounding is reached and the middle is the answer (MuJoCo
 //! documentation, "Computation: solvers"; the details are found by experiment with MuJoCo 3.17).
 
-use super::contact_line::{self, Own};
+use super::contact_line::{self, Island};
 use super::rows::{Acting, Law, bounds, dry_cost, dry_friction, equality, one_sided};
 use super::ties;
 use crate::arrays::Workspace;
@@ -22,7 +22,7 @@ pub(super) struct Segment<'a, F: Num> {
     pub w: &'a Workspace<F>,
     pub acting: Acting,
     /// The island that the line moves.
-    pub own: Own<'a, F>,
+    pub island: Island<'a, F>,
     /// First and second derivative of ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) at the start.
     pub gauss: [F; 2],
     /// The size of the slope below which the search ends.
@@ -101,9 +101,9 @@ impl<C: Cx> Point<C> {
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
         let mut moved = zero;
         for candidate in candidates {
-            let (own, other) = (cx.get(&self.slope), cx.get(&candidate.slope));
-            let rises = own.lt(zero) & other.lt(zero) & own.lt(other);
-            let falls = zero.lt(own) & zero.lt(other) & other.lt(own);
+            let (slope, candidate_slope) = (cx.get(&self.slope), cx.get(&candidate.slope));
+            let rises = slope.lt(zero) & candidate_slope.lt(zero) & slope.lt(candidate_slope);
+            let falls = zero.lt(slope) & zero.lt(candidate_slope) & candidate_slope.lt(slope);
             let takes = rises | falls;
             let (before, after) = (self.values(cx), candidate.values(cx));
             let next = [0, 1, 2, 3, 4].map(|i| C::F::select(takes, after[i], before[i]));
@@ -290,7 +290,7 @@ impl<F: Num> Segment<'_, F> {
         let (jar, weight) = (&self.w.jar, &self.w.row_weight);
         // rows of other islands stay where they are
         let change = |r: usize, dof: usize| {
-            let jv = F::select(self.own.has(dof), self.w.jar_minimum[r], F::c(0.0));
+            let jv = F::select(self.island.has(dof), self.w.jar_minimum[r], F::c(0.0));
             (jv, alpha.fma(jv, jar[r]))
         };
         let mut r = 0;
@@ -325,7 +325,7 @@ impl<F: Num> Segment<'_, F> {
         }
         let all = [sums.cost, sums.slope, sums.curvature, sums.size];
         let mut cells = all.map(|sum| cx.var(sum));
-        contact_line::add::<_, TURNS>(cx, &m.contacts, self.own, alpha, &mut cells);
+        contact_line::add::<_, TURNS>(cx, &m.contacts, self.island, alpha, &mut cells);
         let [cost, slope, curvature, size] = cells;
         Point {
             alpha: cx.var(alpha),

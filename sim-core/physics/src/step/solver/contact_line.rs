@@ -12,19 +12,21 @@ use crate::lane::{Cx, Num};
 use crate::step::constraints::contact_rows::class_list;
 use crate::{each, when};
 
-/// An island, by the island of each dof.
+/// An island, by the labels of dofs.
 #[derive(Clone, Copy)]
-pub(super) struct Own<'a, F: Num> {
+pub(super) struct Island<'a, F: Num> {
     pub search: &'a Search<F::Real>,
-    pub islands: &'a [F],
-    pub island: F,
+    /// The label of each dof's island: see [`super::islands`].
+    pub labels: &'a [F],
+    /// That of this island.
+    pub label: F,
 }
 
-impl<F: Num> Own<'_, F> {
+impl<F: Num> Island<'_, F> {
     /// The worlds in which a dof is of the island.
     #[inline(always)]
     pub fn has(&self, dof: usize) -> F::Mask {
-        is_island(self.islands[dof], self.island)
+        is_island(self.labels[dof], self.label)
     }
 }
 
@@ -58,15 +60,15 @@ pub(super) fn changes<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, s
 pub(super) fn add<C: Cx, const TURNS: bool>(
     cx: &mut C,
     t: &ContactsOf<C>,
-    own: Own<'_, C::F>,
+    island: Island<'_, C::F>,
     alpha: C::F,
     sums: &mut [C::V; 4],
 ) {
     // contacts make one island of all dofs that move them, so the first one tells
-    for root in own.search.islands_of(own.islands.len()) {
-        let here = own.has(root);
+    for root in island.search.islands_of(island.labels.len()) {
+        let here = island.has(root);
         when!(cx, here, {
-            for &k in &own.search.classes[root] {
+            for &k in &island.search.classes[root] {
                 let class = &t.classes[k];
                 let list = class_list(cx, t, k);
                 each!(cx, r in list, {

@@ -4,7 +4,7 @@
 //! its accelerations are M⁻¹ τ. MuJoCo measures an island by the trace of its mass matrix (`mj_island`; the measure is found
 //! by experiment with MuJoCo 3.17).
 
-use super::contact_line::Own;
+use super::contact_line::Island;
 use super::contacts;
 use super::rows::Acting;
 use crate::arrays::Workspace;
@@ -122,12 +122,12 @@ pub(super) fn trace<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     w: &Workspace<C::F>,
-    own: &Own<'_, C::F>,
+    island: &Island<'_, C::F>,
 ) -> C::F {
     let zero = C::F::c(0.0);
     let mut sum = zero;
-    for segment in own.search.segments() {
-        let here = own.has(segment.start);
+    for segment in island.search.segments() {
+        let here = island.has(segment.start);
         if cx.anywhere(here) {
             for j in segment {
                 let diagonal = w.mass_matrix[m.pattern.at(j, j)];
@@ -136,7 +136,7 @@ pub(super) fn trace<C: Cx>(
         }
     }
     for (k, dof) in free_bodies(m) {
-        let here = own.has(dof);
+        let here = island.has(dof);
         if !cx.anywhere(here) {
             continue;
         }
@@ -176,12 +176,12 @@ pub(super) fn norm<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     w: &Workspace<C::F>,
-    own: &Own<'_, C::F>,
+    island: &Island<'_, C::F>,
     step: &[C::F],
 ) -> C::F {
-    let mut sum = dot(cx, own, step, step);
+    let mut sum = dot(cx, island, step, step);
     for (k, dof) in free_bodies(m) {
-        let here = own.has(dof);
+        let here = island.has(dof);
         if cx.anywhere(here) {
             let [linear, angular] = halves(&step[dof..]);
             let moved = angular.cross_add(w.origin[k], linear);
@@ -198,12 +198,12 @@ pub(super) fn force_norm<C: Cx>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     w: &Workspace<C::F>,
-    own: &Own<'_, C::F>,
+    island: &Island<'_, C::F>,
     force: &[C::F],
 ) -> C::F {
-    let mut sum = dot(cx, own, force, force);
+    let mut sum = dot(cx, island, force, force);
     for (k, dof) in free_bodies(m) {
-        let here = own.has(dof);
+        let here = island.has(dof);
         if cx.anywhere(here) {
             let [force, torque] = halves(&force[dof..]);
             let moved = torque - w.origin[k].cross(force);
@@ -216,10 +216,15 @@ pub(super) fn force_norm<C: Cx>(
 
 /// Σ x y over the dofs of an island.
 #[inline(always)]
-pub(super) fn dot<C: Cx>(cx: &mut C, own: &Own<'_, C::F>, first: &[C::F], second: &[C::F]) -> C::F {
+pub(super) fn dot<C: Cx>(
+    cx: &mut C,
+    island: &Island<'_, C::F>,
+    first: &[C::F],
+    second: &[C::F],
+) -> C::F {
     let mut sum = C::F::c(0.0);
-    for segment in own.search.segments() {
-        let here = own.has(segment.start);
+    for segment in island.search.segments() {
+        let here = island.has(segment.start);
         if cx.anywhere(here) {
             for j in segment {
                 let x = C::F::select(here, first[j], C::F::c(0.0));

@@ -37,7 +37,7 @@ pub(super) struct Line<'a, F> {
     jar: &'a [F],
     jv: &'a [F],
     /// The rows of joints, where several lanes share a world.
-    own: &'a [OwnRow<F>],
+    lane_rows: &'a [OwnRow<F>],
 }
 
 /// What the rows add up to at the start of a line. No closure: one that the compiler keeps as a function has none of the
@@ -76,7 +76,7 @@ impl<'a, F: Num> Line<'a, F> {
         params: &'a [F],
         [curvature, power]: [F; 2],
         w: &'a Workspace<F>,
-        own: &'a [OwnRow<F>],
+        lane_rows: &'a [OwnRow<F>],
         acting: Acting,
         corrects: Option<F::Mask>,
     ) -> Self {
@@ -136,7 +136,7 @@ impl<'a, F: Num> Line<'a, F> {
             weight,
             jar,
             jv,
-            own,
+            lane_rows,
         }
     }
 
@@ -159,7 +159,7 @@ impl<'a, F: Num> Line<'a, F> {
         let (weight, jar, jv) = (self.weight, self.jar, self.jv);
         let shares = cx.lanes() > 1;
         if shares {
-            self.add_own(cx, alpha, &mut d);
+            self.add_lane_rows(cx, alpha, &mut d);
         }
         for (r, friction) in (frictions..limits).zip(&m.frictions) {
             if shares {
@@ -206,14 +206,14 @@ impl<'a, F: Num> Line<'a, F> {
 
 impl<F: Num> Line<'_, F> {
     /// Adds the rows of all lanes.
-    fn add_own<C: Cx<F = F>>(&self, cx: &mut C, alpha: F, d: &mut Derivative<F>) {
+    fn add_lane_rows<C: Cx<F = F>>(&self, cx: &mut C, alpha: F, d: &mut Derivative<F>) {
         let zero = F::c(0.0);
         let mut sum = Derivative {
             slope: zero,
             curvature: zero,
             size: zero,
         };
-        for row in self.own {
+        for row in self.lane_rows {
             let here = row.law(alpha);
             let start = Law { ..row.start };
             sum.add(alpha, row.jv, start, here);
@@ -281,8 +281,8 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);
         let close = (d.size * resolution).max(-line.slope * C::F::c(slack));
-        let found = climbs | !close.lt(d.slope.abs());
-        break_if!(cx, found | (above - below).lt(above * resolution));
+        let arrived = climbs | !close.lt(d.slope.abs());
+        break_if!(cx, arrived | (above - below).lt(above * resolution));
         cx.set(&mut low, below);
         cx.set(&mut high, above);
         let before = cx.get(&side);

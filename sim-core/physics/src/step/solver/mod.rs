@@ -94,7 +94,7 @@ use crate::{break_if, times, when};
 use hold::Hold;
 use line::{Line, search};
 use own_rows::own_rows;
-use progress::{Found, Pieces, Plan, Progress};
+use progress::{Pieces, Plan, Progress, SearchResult};
 use rows::{Acting, Jacobian, assemble, forces, residual};
 use spread::Spread;
 use start::choose_start;
@@ -186,11 +186,11 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         // the worlds that search the segment from a to a⁺
         let plan = progress.plan(cx, m, &pieces, gain, corrects);
         // where on it the cost is least
-        let found =
+        let result =
             search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, acting, corrects, spread);
         // the next a, and the worlds that have arrived
-        advance(cx, b, &plan, &found);
-        let done = progress.note(cx, &plan, &found, corrects);
+        advance(cx, b, &plan, &result);
+        let done = progress.note(cx, &plan, &result, corrects);
         break_if!(cx, done);
         progress.count(cx);
     });
@@ -292,8 +292,8 @@ fn minimize_model<C: Cx, const TURNS: bool>(
 
 /// Moves to the minimum of the model, or to the point of the segment that was found.
 #[inline(always)]
-fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, found: &Found<C>) {
-    let (w, alpha) = (&b.work, cx.get(&found.length));
+fn advance<C: Cx>(cx: &mut C, b: &mut BlockOf<C>, plan: &Plan<C>, result: &SearchResult<C>) {
+    let (w, alpha) = (&b.work, cx.get(&result.length));
     for (j, qdd) in b.joint_qdd.iter_mut().enumerate() {
         let moved = alpha.fma(w.minimum[j] - w.start[j], w.start[j]);
         cx.set(qdd, C::F::select(plan.searches, moved, w.minimum[j]));
@@ -312,9 +312,9 @@ fn search_segment<C: Cx, const TURNS: bool>(
     acting: Acting,
     corrects: Option<MaskOf<C>>,
     spread: Option<&Spread<C::F>>,
-) -> Found<C> {
+) -> SearchResult<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-    let mut found = Found {
+    let mut result = SearchResult {
         length: cx.var(one),
         settled: cx.var(zero),
     };
@@ -337,22 +337,22 @@ fn search_segment<C: Cx, const TURNS: bool>(
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
-        let own = own_rows(cx, m, &b.params, &b.work);
+        let lane_rows = own_rows(cx, m, &b.params, &b.work);
         let line = Line::new::<C, TURNS>(
             cx,
             m,
             &b.params,
             [curvature, power],
             &b.work,
-            &own,
+            &lane_rows,
             acting,
             corrects,
         );
         let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
-        search::<C, TURNS>(cx, m, &line, &mut found.length, counts);
-        progress.judge(cx, m, &line, &mut found, plan, corrects);
+        search::<C, TURNS>(cx, m, &line, &mut result.length, counts);
+        progress.judge(cx, m, &line, &mut result, plan, corrects);
     });
-    found
+    result
 }
 
 /// The worlds that have contacts now; none if no world has.

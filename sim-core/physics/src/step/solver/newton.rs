@@ -10,7 +10,7 @@
 //! steps of all.
 
 use super::bracket::{Segment, search};
-use super::contact_line::{self, Own};
+use super::contact_line::{self, Island};
 use super::islands::{dot, find, force_norm, is_island, norm, trace};
 use super::rows::{Acting, Jacobian, residual};
 use super::{constraint_forces, minimize_model, model_cost};
@@ -104,15 +104,15 @@ fn step<C: Cx, const TURNS: bool>(
     let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
     let tolerance = C::F::k(problem.search.tolerance);
     let w = &b.work;
-    let own = Own {
+    let island = Island {
         search: problem.search,
-        islands: &w.island,
-        island: C::F::c(first as f64),
+        labels: &w.island,
+        label: C::F::c(first as f64),
     };
-    let descent = -dot(cx, &own, &w.step, &w.missing);
-    let trace = trace(cx, m, w, &own);
-    let gradient = force_norm(cx, m, w, &own, &w.missing);
-    let length = norm(cx, m, w, &own, &w.step);
+    let descent = -dot(cx, &island, &w.step, &w.missing);
+    let trace = trace(cx, m, w, &island);
+    let gradient = force_norm(cx, m, w, &island, &w.missing);
+    let length = norm(cx, m, w, &island, &w.step);
     let small = (half * descent).div(trace).lt(tolerance);
     let flat = gradient.div(trace).lt(tolerance);
     let near = (small & flat) | (later & (small | flat));
@@ -121,13 +121,14 @@ fn step<C: Cx, const TURNS: bool>(
     let mut ends = cx.var(C::F::c(1.0));
     when!(cx, goes_on, {
         cx.tally(&mut b.solver_work[1], &mut b.solver_block_work[1]);
-        let gauss = [&w.gauss_gradient, &w.joint_force].map(|terms| dot(cx, &own, &w.step, terms));
+        let gauss =
+            [&w.gauss_gradient, &w.joint_force].map(|terms| dot(cx, &island, &w.step, terms));
         let bound = tolerance * C::F::k(problem.search.ls_tolerance) * length * trace;
         let line = Segment {
             params: &b.params,
             w,
             acting: problem.acting,
-            own,
+            island,
             gauss,
             bound,
         };
@@ -135,7 +136,7 @@ fn step<C: Cx, const TURNS: bool>(
         let answer = search::<C, TURNS>(cx, m, &line, counts);
         let (alpha, cost) = (cx.get(&answer.alpha), cx.get(&answer.cost));
         for segment in problem.search.segments() {
-            let here = own.has(segment.start);
+            let here = island.has(segment.start);
             if cx.anywhere(here) {
                 for j in segment {
                     let before = cx.get(&b.joint_qdd[j]);

@@ -43,10 +43,10 @@ pub(super) fn own_rows<C: Cx>(
     let lanes = cx.lanes();
     let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
     let mut add = |cx: &mut C, part: std::ops::Range<usize>, bounds: Option<[Vec<C::F>; 2]>| {
-        let mut own = |values: &[C::F]| cx.own(values);
+        let mut by_lane = |values: &[C::F]| cx.own(values);
         let [jar, jv, weight] =
-            [&w.jar, &w.jar_minimum, &w.row_weight].map(|values| own(&values[part.clone()]));
-        let bounds = bounds.map(|both| both.map(|values| own(&values)));
+            [&w.jar, &w.jar_minimum, &w.row_weight].map(|values| by_lane(&values[part.clone()]));
+        let bounds = bounds.map(|both| both.map(|values| by_lane(&values)));
         let start = equality(jar, weight);
         let mut row = OwnRow {
             jar,

@@ -42,7 +42,7 @@ pub(super) struct Plan<C: Cx> {
 }
 
 /// The result of a search.
-pub(super) struct Found<C: Cx> {
+pub(super) struct SearchResult<C: Cx> {
     /// α of the next accelerations a + α (a⁺ - a); 0 where the step is not taken [–].
     pub length: C::V,
     /// 1 where no further step can help.
@@ -193,7 +193,7 @@ impl<C: Cx> Progress<C> {
         cx: &mut C,
         m: &ConstantsOf<C>,
         line: &Line<'_, C::F>,
-        found: &mut Found<C>,
+        result: &mut SearchResult<C>,
         plan: &Plan<C>,
         corrects: Option<MaskOf<C>>,
     ) {
@@ -212,7 +212,7 @@ impl<C: Cx> Progress<C> {
             if !<<C::F as Num>::Real as Real>::DOUBLE {
                 let next = gain * gain;
                 let is_enough = next.lt(tolerance * C::F::c(EXPECTED) * before);
-                let off = (cx.get(&found.length) - one).abs();
+                let off = (cx.get(&result.length) - one).abs();
                 let is_newtons = off.lt(C::F::c(0.25)) & before.lt(C::F::c(UNKNOWN));
                 ends = ends | (is_enough & is_newtons);
             }
@@ -221,9 +221,9 @@ impl<C: Cx> Progress<C> {
             let known = C::F::select(is_newtons_model, gain, unknown);
             cx.set(&mut self.last_gain, known);
         }
-        cx.set(&mut found.settled, C::F::select(small | last, one, zero));
-        let alpha = cx.get(&found.length);
-        cx.set(&mut found.length, C::F::select(small, zero, alpha));
+        cx.set(&mut result.settled, C::F::select(small | last, one, zero));
+        let alpha = cx.get(&result.length);
+        cx.set(&mut result.length, C::F::select(small, zero, alpha));
     }
 
     /// The worlds that have arrived: no row changed its piece, or the search settled.
@@ -232,19 +232,19 @@ impl<C: Cx> Progress<C> {
         &mut self,
         cx: &mut C,
         plan: &Plan<C>,
-        found: &Found<C>,
+        result: &SearchResult<C>,
         corrects: Option<MaskOf<C>>,
     ) -> MaskOf<C> {
         let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
         let is_calm = half.lt(cx.get(&self.calm)) | plan.quiet;
         let ends = !plan.changed & is_calm;
-        let done = ends | half.lt(cx.get(&found.settled));
+        let done = ends | half.lt(cx.get(&result.settled));
         if let Some(corrects) = corrects {
             let again = corrects & plan.changed;
             cx.set(&mut self.calm, C::F::select(again, zero, one));
         }
         cx.set(&mut self.busy, C::F::select(done, zero, one));
-        let moves = plan.searches & zero.lt(cx.get(&found.length));
+        let moves = plan.searches & zero.lt(cx.get(&result.length));
         cx.set(&mut self.searched, C::F::select(moves, one, zero));
         done
     }

@@ -221,9 +221,9 @@ pub(super) fn assemble<F: Num>(
         let pull = pull(&law, jar[r], aref[r], corrects);
         let (f, l, ratio) = (e.follower, e.leader, F::k(e.multiplier));
         let shared = law.stiffness * ratio;
-        let (own, others) = (m.pattern.at(f, f), m.pattern.at(l, l));
-        hessian[own] = hessian[own] + law.stiffness;
-        hessian[others] = shared.fma(ratio, hessian[others]);
+        let (at_follower, at_leader) = (m.pattern.at(f, f), m.pattern.at(l, l));
+        hessian[at_follower] = hessian[at_follower] + law.stiffness;
+        hessian[at_leader] = shared.fma(ratio, hessian[at_leader]);
         let coupling = m.pattern.at(f.max(l), f.min(l));
         hessian[coupling] = hessian[coupling] - shared;
         rhs[f] = rhs[f] + pull;

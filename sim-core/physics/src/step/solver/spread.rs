@@ -32,7 +32,7 @@ pub(super) struct Spread<F> {
 }
 
 /// Values of dofs, another in each lane: an entry per column.
-fn own<C: Cx>(cx: &mut C, lanes: usize, group: usize, values: &[C::F]) -> C::F {
+fn group_values<C: Cx>(cx: &mut C, lanes: usize, group: usize, values: &[C::F]) -> C::F {
     let first = group * lanes;
     cx.own(&values[first..values.len().min(first + lanes)])
 }
@@ -56,12 +56,14 @@ impl<F: Num> Spread<F> {
         for i in 0..size {
             let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
             for group in 0..groups {
-                spread.mass.push(own(cx, lanes, group, &row));
+                spread.mass.push(group_values(cx, lanes, group, &row));
             }
         }
         let diagonal: Vec<F> = (0..size).map(|i| entry(i, i)).collect();
         for group in 0..groups {
-            spread.diagonal.push(own(cx, lanes, group, &diagonal));
+            spread
+                .diagonal
+                .push(group_values(cx, lanes, group, &diagonal));
         }
         Some(spread)
     }
@@ -103,13 +105,13 @@ impl<F: Num> Spread<F> {
         for i in 0..size {
             let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
             for group in 0..groups {
-                let more = own(cx, lanes, group, &row);
+                let more = group_values(cx, lanes, group, &row);
                 cells.push(cx.var(self.mass[i * groups + group] + more));
             }
         }
         let mut sides: Vec<C::V> = Vec::with_capacity(groups);
         for group in 0..groups {
-            let side = own(cx, lanes, group, vector);
+            let side = group_values(cx, lanes, group, vector);
             sides.push(cx.var(side));
         }
         for class in 0..m.contacts.classes.len() {
@@ -172,18 +174,18 @@ impl<F: Num> Spread<F> {
             let mut stiff = vec![None; self.groups];
             for (group, column) in columns.iter().enumerate() {
                 let Some((place, has)) = *column else { continue };
-                let mut own = [F::c(0.0); 3];
-                for (i, x) in own.iter_mut().enumerate() {
+                let mut jacobian = [F::c(0.0); 3];
+                for (i, x) in jacobian.iter_mut().enumerate() {
                     *x = cx.load_at(rows, r, row::JACOBIAN + i, place) * has;
                 }
-                let mut product = own;
+                let mut product = jacobian;
                 for i in 0..3 {
-                    let along = weight[i][1].fma(own[1], weight[i][2] * own[2]);
-                    product[i] = weight[i][0].fma(own[0], along);
+                    let along = weight[i][1].fma(jacobian[1], weight[i][2] * jacobian[2]);
+                    product[i] = weight[i][0].fma(jacobian[0], along);
                 }
                 stiff[group] = Some(product);
                 let mut sum = cx.get(&sides[group]);
-                for (x, f) in own.into_iter().zip(force) {
+                for (x, f) in jacobian.into_iter().zip(force) {
                     sum = x.fma(f, sum);
                 }
                 cx.put(&mut sides[group], sum);

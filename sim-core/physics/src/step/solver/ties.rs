@@ -69,12 +69,12 @@ pub(super) fn assemble<F: Num>(
         for row in 0..tie.rows {
             let law = law(&tie.law, jar[r], weight[r]);
             let pull = pull(&law, jar[r], aref[r], corrects);
-            let own = &jacobian[tie.jacobian(row)];
+            let entries = &jacobian[tie.jacobian(row)];
             let mut places = tie.places.iter();
             for (i, &dof) in tie.dofs.iter().enumerate() {
-                rhs[dof] = own[i].fma(pull, rhs[dof]);
-                let stiff = law.stiffness * own[i];
-                for (other, &place) in own[..i + 1].iter().zip(places.by_ref()) {
+                rhs[dof] = entries[i].fma(pull, rhs[dof]);
+                let stiff = law.stiffness * entries[i];
+                for (other, &place) in entries[..i + 1].iter().zip(places.by_ref()) {
                     hessian[place] = stiff.fma(*other, hessian[place]);
                 }
             }

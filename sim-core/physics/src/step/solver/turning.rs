@@ -42,8 +42,8 @@ impl<F: Num> TurningLaw<F> {
         let aligned = aligned * self.along;
         let mut product = [first; 6];
         for i in 0..5 {
-            let own = self.diagonal[i].fma(u[i + 1], self.direction[i] * aligned);
-            product[i + 1] = self.cross[i].fma(u[0], own);
+            let tangential = self.diagonal[i].fma(u[i + 1], self.direction[i] * aligned);
+            product[i + 1] = self.cross[i].fma(u[0], tangential);
         }
         product
     }
@@ -185,7 +185,7 @@ fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw
         direction: [zero; 5],
     };
     for i in 0..5 {
-        let own = match i {
+        let edge_stiffness = match i {
             0 | 1 => stiff,
             _ => stiff * exists[i - 2],
         };
@@ -193,10 +193,10 @@ fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw
         let edges = [jar[0] + side, jar[0] - side];
         let (mut push, mut active) = ([zero; 2], [zero; 2]);
         for (e, edge) in edges.into_iter().enumerate() {
-            let force = -(own * edge);
+            let force = -(edge_stiffness * edge);
             let on = zero.lt(force);
             push[e] = F::select(on, force, zero);
-            active[e] = F::select(on, own, zero);
+            active[e] = F::select(on, edge_stiffness, zero);
             let bit = F::c(f64::from(1 << (2 * i + e)));
             law.state = law.state + F::select(on, bit, zero);
             law.cost = law.cost - half * push[e] * edge;
