@@ -43,6 +43,7 @@ impl<C: Cx> Hold<C> {
     /// The worlds in which a contact is held, if it slides. Its row is that of the last line search.
     #[inline(always)]
     pub fn of_contact(&self, cx: &mut C, t: &ContactsOf<C>, r: C::I) -> MaskOf<C> {
+        // only friction has this kink; STATE 2 is the sliding piece
         let rubs = C::F::c(0.0).lt(cx.load(t.memory.rows, r, row::MU));
         let slid = C::F::c(1.5).lt(cx.load(t.memory.rows, r, row::STATE));
         let [square, mixed, _] = cx.load3(t.memory.rows, r, row::SQUARES);

@@ -27,6 +27,7 @@ pub(super) fn coupling<C: Cx>(
     if touching.is_none() || !m.contacts.couples() {
         return None;
     }
+    // a block without such a contact in any world assembles no larger system
     let some = C::F::c(0.5).lt(contacts::coupling(cx, &m.contacts));
     cx.anywhere(some).then_some(some)
 }
@@ -49,11 +50,13 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
 ) -> C::F {
     let t = &m.contacts;
     let w = &mut b.work;
+    // the right-hand side of a correction is complete: contacts add to H alone
     let (vector, pulls, hold) = match x {
         Unknown::Minimum(hold) => (&mut w.minimum, true, hold),
         Unknown::Missing => (&mut w.missing, false, None),
     };
     let touches = touching.is_some();
+    // matrix and right-hand side as cells, since the loops over contacts add to cells
     if touches {
         cx.put_values(&w.hessian, &mut b.system);
         for (cell, value) in b.pull.iter_mut().zip(&*vector) {
@@ -73,6 +76,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
         if larger && !couples {
             break;
         }
+        // the larger system takes over what the smaller one has: M, joint rows, contacts that couple nothing
         if let (true, Some(some)) = (larger, coupling) {
             when!(cx, some, {
                 let smaller = &*cx.cells(&mut w.hessian, &mut b.system);
@@ -80,17 +84,20 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
                 widen(cx, &m.coupled.places, smaller, cells);
             });
         }
+        // M's pattern, or the one with couplings
         let coupled = (&mut w.coupled_hessian, &mut b.coupled_system);
         let (pattern, (matrix, system)) = match larger {
             true => (&m.coupled.pattern, coupled),
             false => (&m.pattern, (&mut w.hessian, &mut b.system)),
         };
+        // Jᵀ W J and Jᵀ f of contacts whose entries lie in M's pattern, then in the larger system of the others
         if touches {
             let cells = cx.cells(matrix, system);
             for k in (0..t.classes.len()).filter(|&k| t.classes[k].couples == larger) {
                 assembly::assemble::<_, TURNS>(cx, t, k, cells, &mut b.pull, pulls, hold);
             }
         }
+        // each world solves the smallest system that has all of its contacts, and leaves x in `solution`
         if let (true, Some(some)) = (solves_both, coupling) {
             let solves = if larger { some } else { !some };
             when!(cx, solves, {
@@ -113,6 +120,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
             solve_linear(pattern, matrix, vector);
         }
     }
+    // each world's x, from whichever system it solved
     if solves_both {
         gather(cx, &b.solution, vector);
     }
@@ -149,6 +157,7 @@ fn stiffening_of<F: Num>(
     mass_matrix: &[F],
 ) -> F {
     let mut largest = F::c(1.0);
+    // H(j,j) / M(j,j) scales the rounding of the step, which inverse dynamics corrects if the model has refinements
     if !F::Real::DOUBLE && m.solver.refinements == 0 {
         for j in 0..m.dofs.len() {
             let ratio = hessian[pattern.at(j, j)].div(mass_matrix[m.pattern.at(j, j)]);
@@ -166,6 +175,7 @@ fn stiffening_of<F: Num>(
 pub(super) fn touched_gain<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) -> C::F {
     let (zero, half) = (C::F::c(0.0), C::F::c(0.5));
     let (step, gains) = (&b.work.minimum, &mut b.work.step);
+    // ½ g · x of each part of the mass matrix, with x = H⁻¹ g
     for (gain, rows) in gains.iter_mut().zip(m.pattern.parts()) {
         let mut sum = zero;
         for j in rows {
@@ -175,6 +185,7 @@ pub(super) fn touched_gain<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockO
         *gain = half * sum.abs();
     }
     let mut sum = zero;
+    // parts that contacts of a class touch, in the worlds that have some now
     for (k, class) in m.contacts.classes.iter().enumerate() {
         let at = cx.at(k);
         let touches = half.lt(cx.load(m.contacts.memory.counts, at, 0));

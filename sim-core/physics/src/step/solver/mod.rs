@@ -141,9 +141,11 @@ impl<const TURNS: bool> Stage for Solver<TURNS> {
 /// Newton's method, from the last step's accelerations to the minimum of the cost.
 #[inline(always)]
 fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // D and aref of all rows but those of contacts, as values of this stage
     gather(cx, &b.efc_weight, &mut b.work.row_weight);
     gather(cx, &b.efc_aref, &mut b.work.row_aref);
     let acting = Acting::find(cx, m, &b.work.row_weight);
+    // as MuJoCo: from M⁻¹ τ where that costs less than the last step's result
     if <<C::F as Num>::Real as Real>::DOUBLE {
         choose_start::<C, TURNS>(cx, m, b, acting);
     }
@@ -165,12 +167,14 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         constraint_forces::<C, TURNS>(cx, m, b, acting);
         return;
     }
+    // where lanes share a world, H is spread over them by columns; torsional friction has no such system
     let spread = match corrects {
         Some(_) if !TURNS => Spread::new(cx, m, &b.work.mass_matrix),
         _ => None,
     };
     let spread = spread.as_ref();
     let mut progress = Progress::new(cx, acts, corrects);
+    // Newton's iterations, until each world has arrived or has none left
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, !acts);
@@ -194,8 +198,10 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         break_if!(cx, done);
         progress.count(cx);
     });
+    // worlds that are still busy used up their iterations
     progress.report(cx, b);
 
+    // worlds in which nothing acts have no constraint force; the others evaluate theirs at the last a
     if may_idle::<C>(m) {
         for force in b.efc_force.iter_mut().chain(&mut b.constraint_force) {
             cx.set(force, C::F::c(0.0));
@@ -220,10 +226,12 @@ fn model_cost<C: Cx, const TURNS: bool>(
     spread: Option<&Spread<C::F>>,
 ) {
     let w = &mut b.work;
+    // a, and τ on the right-hand side, whose place the solution takes
     for j in 0..m.dofs.len() {
         w.start[j] = cx.get(&b.joint_qdd[j]);
         w.minimum[j] = w.smooth_force[j];
     }
+    // worlds that solve for a⁺ - a have τ - M a instead
     if let Some(corrects) = corrects {
         match spread {
             None => multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.joint_force),
@@ -234,11 +242,12 @@ fn model_cost<C: Cx, const TURNS: bool>(
             w.minimum[j] = C::F::select(corrects, less, w.minimum[j]);
         }
     }
+    // H = M; a spread system keeps its own M, and adds the terms of joints to it
     match spread {
         None => w.hessian.copy_from_slice(&w.mass_matrix),
-        // the terms of joints alone
         Some(_) => w.hessian.fill(C::F::c(0.0)),
     }
+    // jar of joint rows and ties; then Jᵀ W J in H, and their pull on the right-hand side
     residual(
         m,
         Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
@@ -247,6 +256,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
         &mut w.jar,
     );
     assemble(m, &b.params, w, acting, corrects);
+    // contacts have jar alone here: their Jᵀ W J is assembled when the system is solved
     if corrects.is_some() {
         contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
     }
@@ -264,6 +274,7 @@ fn minimize_model<C: Cx, const TURNS: bool>(
     spread: Option<&Spread<C::F>>,
     hold: Option<Hold<C>>,
 ) -> (C::F, C::F) {
+    // H x = rhs with the terms of contacts; x is a⁺, or a⁺ - a in worlds that correct
     let stiffening = match spread {
         None => {
             let unknown = linear::Unknown::Minimum(hold);
@@ -274,6 +285,7 @@ fn minimize_model<C: Cx, const TURNS: bool>(
             spread.solve(cx, m, &w.hessian, &mut w.minimum, &mut b.pull, hold)
         }
     };
+    // ½ gᵀ H⁻¹ g of bodies in contact, for `f32` alone: the reference goes on, as MuJoCo does
     let gain = match corrects {
         Some(corrects) if !<<C::F as Num>::Real as Real>::DOUBLE => {
             C::F::select(corrects, linear::touched_gain(cx, m, b), C::F::c(UNKNOWN))
@@ -281,6 +293,7 @@ fn minimize_model<C: Cx, const TURNS: bool>(
         _ => C::F::c(UNKNOWN),
     };
     let w = &mut b.work;
+    // a⁺ = a + x where a correction was solved for
     if let Some(corrects) = corrects {
         for j in 0..m.dofs.len() {
             let whole = w.start[j] + w.minimum[j];
@@ -314,6 +327,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
     spread: Option<&Spread<C::F>>,
 ) -> SearchResult<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+    // worlds that do not search go all the way to a⁺: α = 1
     let mut result = SearchResult {
         length: cx.var(one),
         settled: cx.var(zero),
@@ -321,6 +335,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
     when!(cx, plan.searches, {
         cx.tally(&mut b.solver_work[1], &mut b.solver_block_work[1]);
         let w = &mut b.work;
+        // s = a⁺ - a and M s: the quadratic term of p along the segment
         for j in 0..m.dofs.len() {
             w.step[j] = w.minimum[j] - w.start[j];
         }
@@ -328,6 +343,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
             None => multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force),
             Some(spread) => spread.multiply(cx, &w.step, &mut w.joint_force),
         }
+        // sᵀ M s, and Σ |τ a|: the share of smooth forces in the rounding of the gradient
         let (mut curvature, mut power) = (zero, zero);
         for j in 0..m.dofs.len() {
             curvature = w.step[j].fma(w.joint_force[j], curvature);
@@ -337,6 +353,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
         for r in 0..m.rows() {
             w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
         }
+        // p at α = 0: its descent, and the rounding in it
         let lane_rows = own_rows(cx, m, &b.params, &b.work);
         let line = Line::new::<C, TURNS>(
             cx,
@@ -348,6 +365,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
             acting,
             corrects,
         );
+        // α where p'(α) = 0, and whether the gain ends the solve
         let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
         search::<C, TURNS>(cx, m, &line, &mut result.length, counts);
         progress.judge(cx, m, &line, &mut result, plan, corrects);
@@ -373,10 +391,12 @@ fn constraint_forces<C: Cx, const TURNS: bool>(
     let (a, joint) = (&mut w.start, &mut w.joint_force);
     let (jar, force) = (&mut w.jar, &mut w.row_force);
     let (weight, aref) = (&w.row_weight, &w.row_aref);
+    // a, and Jᵀ f from 0
     for j in 0..m.dofs.len() {
         a[j] = cx.get(&b.joint_qdd[j]);
         joint[j] = C::F::c(0.0);
     }
+    // f = -s'(J a - aref) of joint rows and ties, with their Jᵀ f
     residual(
         m,
         Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
@@ -392,6 +412,7 @@ fn constraint_forces<C: Cx, const TURNS: bool>(
         force,
         joint,
     );
+    // into cells, to which the loops over contacts add their Jᵀ f
     for r in 0..m.rows() {
         cx.set(&mut b.efc_force[r], force[r]);
     }
@@ -420,6 +441,7 @@ fn gather<C: Cx>(cx: &mut C, cells: &[C::V], to: &mut [C::F]) {
 /// not skip: its start is MuJoCo's.
 fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
     let mut ties = m.ties.iter();
+    // equalities and dry friction act at any position, ranges only past their bounds
     let only_limits = m.equalities.is_empty()
         && m.frictions.is_empty()
         && ties.all(|tie| matches!(tie.law, TieLaw::Range(_)));
@@ -431,6 +453,7 @@ fn may_idle<C: Cx>(m: &ConstantsOf<C>) -> bool {
 fn acts<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, weight: &[C::V]) -> MaskOf<C> {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let mut stiffest = zero;
+    // above 0 where a row has a stiffness or a contact exists; in a model that may not idle all worlds act
     if may_idle::<C>(m) {
         for weight in weight {
             stiffest = stiffest.max(cx.get(weight));

@@ -41,6 +41,8 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let dofs = m.dofs.len();
+    // trees that no constraint acts on end at M⁻¹ τ; the others begin at the start that was chosen,
+    // and their island is busy at its first dof
     find(cx, m, problem.search, b, problem.acting);
     for j in 0..dofs {
         let constrained = b.work.island[j].lt(C::F::c(dofs as f64));
@@ -51,12 +53,15 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
         cx.set(&mut b.busy[j], C::F::select(is_first, one, zero));
     }
     let mut iteration = cx.var(zero);
+    // iterations, until no island of any world is busy
     times!(cx, m.solver.iterations, {
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
+        // Jᵀ f at a, then H and its minimum a⁺
         constraint_forces::<C, TURNS>(cx, m, b, problem.acting);
         model_cost::<C, TURNS>(cx, m, b, problem.acting, problem.corrects, None);
         minimize_model::<C, TURNS>(cx, m, b, problem.corrects, problem.coupling, None, None);
         let w = &mut b.work;
+        // M a - τ, the gradient g = M a - τ - Jᵀ f, and s = a⁺ - a
         multiply(&m.pattern, &w.mass_matrix, &w.start, &mut w.gauss_gradient);
         for j in 0..dofs {
             w.gauss_gradient[j] = w.gauss_gradient[j] - w.smooth_force[j];
@@ -65,10 +70,12 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
         }
         // along the steps of all islands: none is coupled to another one
         multiply(&m.pattern, &w.mass_matrix, &w.step, &mut w.joint_force);
+        // J s of all rows: how jar changes along the step; with aref = 0 the residual is J s
         w.row_force.fill(zero);
         let jacobian = Jacobian::new(problem.acting, &w.limit_side, &w.row_jacobian);
         residual(m, jacobian, &w.row_force, &w.step, &mut w.jar_minimum);
         contact_line::changes::<_, TURNS>(cx, &m.contacts, &w.step);
+        // each busy island searches its own line and moves on it
         let later = C::F::c(0.5).lt(cx.get(&iteration));
         let mut busy = zero;
         for first in problem.search.islands_of(dofs) {
@@ -109,10 +116,12 @@ fn step<C: Cx, const TURNS: bool>(
         labels: &w.island,
         label: C::F::c(first as f64),
     };
+    // -g · s = gᵀ H⁻¹ g, tr M = 1 / c, |g| and |s|, the last three in MuJoCo's velocities
     let descent = -dot(cx, &island, &w.step, &w.missing);
     let trace = trace(cx, m, w, &island);
     let gradient = force_norm(cx, m, w, &island, &w.missing);
     let length = norm(cx, m, w, &island, &w.step);
+    // arrived where both measures are below the tolerance, after a step where one is, or where s is too short
     let small = (half * descent).div(trace).lt(tolerance);
     let flat = gradient.div(trace).lt(tolerance);
     let near = (small & flat) | (later & (small | flat));
@@ -121,6 +130,7 @@ fn step<C: Cx, const TURNS: bool>(
     let mut ends = cx.var(C::F::c(1.0));
     when!(cx, goes_on, {
         cx.tally(&mut b.solver_work[1], &mut b.solver_block_work[1]);
+        // slope s · (M a - τ) and curvature sᵀ M s of the smooth term; the slope at which the search ends
         let gauss =
             [&w.gauss_gradient, &w.joint_force].map(|terms| dot(cx, &island, &w.step, terms));
         let bound = tolerance * C::F::k(problem.search.ls_tolerance) * length * trace;
@@ -132,9 +142,11 @@ fn step<C: Cx, const TURNS: bool>(
             gauss,
             bound,
         };
+        // α of the least cost, and what it gains
         let counts = (&mut b.solver_work[2], &mut b.solver_block_work[2]);
         let answer = search::<C, TURNS>(cx, m, &line, counts);
         let (alpha, cost) = (cx.get(&answer.alpha), cx.get(&answer.cost));
+        // a += α s, in the trees of this island
         for segment in problem.search.segments() {
             let here = island.has(segment.start);
             if cx.anywhere(here) {
@@ -145,6 +157,7 @@ fn step<C: Cx, const TURNS: bool>(
                 }
             }
         }
+        // no point costs less than the start
         let stays = !zero.lt(alpha.abs());
         // a step that lost is followed by another one
         let gains_little = !zero.lt(cost) & (-cost).div(trace).lt(tolerance);

@@ -85,6 +85,7 @@ impl<C: Cx> Pieces<C> {
         corrects: Option<MaskOf<C>>,
     ) -> Pieces<C> {
         let (w, half) = (&mut b.work, C::F::c(0.5));
+        // jar at a⁺
         residual(
             m,
             Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
@@ -92,6 +93,7 @@ impl<C: Cx> Pieces<C> {
             &w.minimum,
             &mut w.jar_minimum,
         );
+        // joint rows and ties: how many are on another piece, and how many frictions reverse
         let [sum, turned] = changes(
             m,
             &b.params,
@@ -99,6 +101,7 @@ impl<C: Cx> Pieces<C> {
             [&w.row_weight, &w.jar, &w.jar_minimum],
         );
         let (mut moved, mut curved) = (cx.var(sum), cx.var(turned));
+        // contacts: one that slides counts as changed, since its cost is not quadratic
         if corrects.is_some() {
             contacts::residual::<_, TURNS>(cx, &m.contacts, &w.minimum, row::AHEAD);
             contacts::changes::<_, TURNS>(cx, &m.contacts, &mut moved, &mut curved);
@@ -136,6 +139,7 @@ impl<C: Cx> Progress<C> {
         let iteration = cx.get(&self.iteration);
         let is_last = C::F::c(m.solver.iterations as f64 - 1.5).lt(iteration);
         let searched = half.lt(cx.get(&self.searched));
+        // all that slide in the first iteration; after a search those whose slip its whole step would have reversed
         Hold::new(m, iteration.lt(half) & !is_last, searched & !is_last)
     }
 
@@ -155,6 +159,7 @@ impl<C: Cx> Progress<C> {
         let early = cx
             .get(&self.iteration)
             .lt(C::F::c(trusted_iterations::<C::F>()));
+        // a whole step saves the line search: early iterations take it unless a contact slides or a friction reverses
         let mut trusted = early & pieces.straight;
         // the edges of a pyramid may be too stiff for the factorisation
         if let (Some(corrects), Cone::Pyramidal) = (corrects, m.contacts.cone)
@@ -172,7 +177,9 @@ impl<C: Cx> Progress<C> {
             true => gain,
             false => C::F::select(pieces.straight, gain * (rounding * rounding).min(one), gain),
         };
+        // no row leaves its piece, and the gain that is left is below the tolerance
         let quiet = !changed & left.lt(C::F::k(m.solver.tolerance));
+        // the first step is exact if no row changed its piece; any other one is searched unless trusted or quiet
         Plan {
             changed,
             later,
@@ -199,9 +206,11 @@ impl<C: Cx> Progress<C> {
     ) {
         let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
         let tolerance = C::F::k(m.solver.tolerance);
+        // the model gains ½ |p'(0)|: too little for another step, unless contacts are held
         let gain = half * line.descent;
         let is_newtons_model = line.held.lt(half);
         let small = is_newtons_model & plan.later & gain.lt(tolerance);
+        // the last step where rounding alone would predict as much
         let mut last = gain.lt(line.noise);
         if let Some(corrects) = corrects {
             let before = cx.get(&self.last_gain);
@@ -209,6 +218,7 @@ impl<C: Cx> Progress<C> {
             let stalls = (C::F::c(STALLED) * before).lt(gain);
             let is_small = gain.lt(line.noise * C::F::c(DOUBTED));
             let mut ends = stalls & is_small;
+            // Newton's gains shrink with the square: the next one is about gain² / before, if this step has α ≈ 1
             if !<<C::F as Num>::Real as Real>::DOUBLE {
                 let next = gain * gain;
                 let is_enough = next.lt(tolerance * C::F::c(EXPECTED) * before);
@@ -216,11 +226,13 @@ impl<C: Cx> Progress<C> {
                 let is_newtons = off.lt(C::F::c(0.25)) & before.lt(C::F::c(UNKNOWN));
                 ends = ends | (is_enough & is_newtons);
             }
+            // a model with held contacts settles nothing, and is no measure of the next gain
             last = is_newtons_model & (last | (corrects & ends));
             let unknown = C::F::c(2.0 * UNKNOWN);
             let known = C::F::select(is_newtons_model, gain, unknown);
             cx.set(&mut self.last_gain, known);
         }
+        // both settle the world; a step that gains less than the tolerance is not taken: α = 0
         cx.set(&mut result.settled, C::F::select(small | last, one, zero));
         let alpha = cx.get(&result.length);
         cx.set(&mut result.length, C::F::select(small, zero, alpha));
@@ -236,6 +248,7 @@ impl<C: Cx> Progress<C> {
         corrects: Option<MaskOf<C>>,
     ) -> MaskOf<C> {
         let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+        // no change of piece ends a solve; worlds with contacts need two such iterations in succession, or a quiet one
         let is_calm = half.lt(cx.get(&self.calm)) | plan.quiet;
         let ends = !plan.changed & is_calm;
         let done = ends | half.lt(cx.get(&result.settled));
@@ -244,6 +257,7 @@ impl<C: Cx> Progress<C> {
             cx.set(&mut self.calm, C::F::select(again, zero, one));
         }
         cx.set(&mut self.busy, C::F::select(done, zero, one));
+        // a searched step that was taken: its slips tell which contacts the next model may hold
         let moves = plan.searches & zero.lt(cx.get(&result.length));
         cx.set(&mut self.searched, C::F::select(moves, one, zero));
         done

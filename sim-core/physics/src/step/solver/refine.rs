@@ -94,6 +94,7 @@ fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     if may_idle::<C>(m) {
         let idle = !acts(cx, m, &b.efc_weight);
         when!(cx, idle, {
+            // from a = 0 the first pass is forward dynamics, M⁻¹ τ; the others refine it
             for qdd in &mut b.joint_qdd {
                 cx.set(qdd, C::F::c(0.0));
             }
@@ -107,12 +108,14 @@ fn accelerations<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 /// One pass: a += (M + Jᵀ W J)⁻¹ missing, and the forces at the new accelerations.
 #[inline(always)]
 fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // ID(q, q̇, a), into `missing`; D and aref of the rows
     inverse_dynamics(cx, m, b);
     let n = m.dofs.len();
     let w = &mut b.work;
     gather(cx, &b.efc_weight, &mut w.row_weight);
     gather(cx, &b.efc_aref, &mut w.row_aref);
     let acting = Acting::find(cx, m, &w.row_weight);
+    // missing = τ + Jᵀ f - ID, where `smooth_force` lacks the bias force that ID has
     for j in 0..n {
         w.start[j] = cx.get(&b.joint_qdd[j]);
         let applied = w.smooth_force[j] + w.bias_force[j];
@@ -120,6 +123,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         // the right-hand side that is assembled with the Hessian is not used
         w.minimum[j] = C::F::c(0.0);
     }
+    // H = M + Jᵀ W J with the pieces that the rows are on at a
     w.hessian.copy_from_slice(&w.mass_matrix);
     residual(
         m,
@@ -130,6 +134,7 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     );
     assemble(m, &b.params, w, acting, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
+    // a += H⁻¹ missing, then the forces at the new a
     let touching = contacts::touching(cx, &m.contacts);
     let coupling = coupling(cx, m, touching);
     solve_system::<_, true>(cx, m, b, Unknown::Missing, touching, coupling);
