@@ -43,26 +43,31 @@ pub(super) fn elliptic<F: Num>(
 ) -> ConeLaw<F> {
     let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
     let ratio = impratio.to_f64();
+    // slip t = |jar of the tangents|, and its direction d = (x, y)
     let square = jar[1].fma(jar[1], jar[2] * jar[2]);
     let slip = square.sqrt();
     // slip > 0 where a contact slides; elsewhere the quotient is not used
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
     let (x, y) = (jar[1] * inverse, jar[2] * inverse);
+    // jar₀ - μ t ≥ 0: separated; μ jar₀ + impratio t ≤ 0: sticks, as does a contact that is held
     let excess = mu.fnma(slip, jar[0]);
     let leaves = !excess.lt(zero);
     let mut sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
     if let Some(holds) = holds {
         sticks = sticks | holds;
     }
+    // masks that exclude each other; a contact of stiffness 0, past its margin, is on no piece
     let acts = !leaves & zero.lt(stiff);
     let sticks = acts & sticks;
     let slides = acts & !sticks;
+    // impratio D along the tangents; normal force of the sliding piece, -D / (1 + μ²/impratio) (jar₀ - μ t)
     let across = stiff * F::c(ratio);
     let push = -(soft * excess);
     // sliding: soft (1, -μ d)(1, -μ d)ᵀ, and the rotation of the friction force with the slip direction d
     let rub = soft * mu;
     let turn = (push * mu) * inverse;
     let along = rub * mu - turn;
+    // the friction of a contact that slides: μ times its normal force, against d
     let pull = -(push * mu);
     ConeLaw {
         force: [
@@ -110,12 +115,15 @@ pub(super) fn elliptic_along<F: Num>(
 ) -> LineLaw<F> {
     let (zero, one) = (F::c(0.0), F::c(1.0));
     let ratio = impratio.to_f64();
+    // jar₀ at α
     let normal = alpha.fma(change, normal);
     // half the rate of the squared slip
     let turn = alpha.fma(end, mixed);
+    // t² = jar · jar + 2 α jar · jv + α² jv · jv over the tangents; rounding may leave it below 0
     let square = alpha.fma(mixed + turn, start).max(zero);
     let slip = square.sqrt();
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
+    // the pieces of `elliptic`
     let excess = mu.fnma(slip, normal);
     let leaves = !excess.lt(zero);
     let sticks = !zero.lt(mu.fma(normal, slip * F::c(ratio)));
@@ -128,7 +136,9 @@ pub(super) fn elliptic_along<F: Num>(
     let rate = turn * inverse;
     let speed = mu.fnma(rate, change);
     let growth = rate.fnma(rate, end).max(zero) * inverse;
+    // sticking: s' = D jar₀ jv₀ + impratio D t t'
     let pulled = (stiff * normal).fma(change, across * turn);
+    // p' = -power; sliding: s'' = soft (e'² + e e'') with e = jar₀ - μ t, e'' = -μ t''
     LineLaw {
         power: by_piece::<F>(sticks, slides, -pulled, push * speed),
         bend: by_piece::<F>(
@@ -155,6 +165,7 @@ pub(super) fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
     let mut push = [zero; 4];
     let mut active = [zero; 4];
     let (mut state, mut cost) = (zero, zero);
+    // edges jar₀ ± μ jar₁, jar₀ ± μ jar₂: s = ½ D edge² = -½ force · edge where it pushes; bit i tells that it does
     for (i, edge) in [jar[0] + a, jar[0] - a, jar[0] + b, jar[0] - b]
         .into_iter()
         .enumerate()
@@ -166,6 +177,7 @@ pub(super) fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
         state = state + F::select(on, F::c(f64::from(1 << i)), zero);
         cost = cost - half * push[i] * edge;
     }
+    // edges have J = (1, ± μ): opposite ones add up along the normal, and their difference acts along the tangent
     let square = mu * mu;
     ConeLaw {
         force: [

@@ -37,6 +37,7 @@ pub(super) fn changes<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, s
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // J s by runs of columns: of normal and tangents, then of rotations
             let (mut moves, mut turns) = (zero, zero);
             for run in &class.runs {
                 let first = row::JACOBIAN + 3 * run.column;
@@ -72,6 +73,7 @@ pub(super) fn add<C: Cx, const TURNS: bool>(
                 let class = &t.classes[k];
                 let list = class_list(cx, t, k);
                 each!(cx, r in list, {
+                    // s(α) - s(0), p' = -f · jv, p'' = jvᵀ W jv, and |f · jv| for the rounding of p'
                     let terms = match block_of::<_, TURNS>(class) {
                         None => {
                             let jar = cx.load3(t.memory.rows, r, row::JAR);
@@ -100,6 +102,7 @@ pub(super) fn add<C: Cx, const TURNS: bool>(
                             [law.cost - start.cost, -power, bend, power.abs()]
                         }
                     };
+                    // worlds without this contact add 0
                     for (sum, term) in sums.iter_mut().zip(terms) {
                         let total = cx.get(sum) + cx.only(term);
                         cx.put(sum, total);

@@ -72,6 +72,7 @@ fn law_along<C: Cx, const TURNS: bool>(
     alpha: C::F,
 ) -> LineLaw<C::F> {
     let rows = t.memory.rows;
+    // the slip at any α needs only jar · jar, jar · jv and jv · jv of the tangents
     if t.cone == Cone::Elliptic {
         let normal = [cx.load(rows, r, row::JAR), cx.load(rows, r, row::AHEAD)];
         let squares = cx.load3(rows, r, row::SQUARES);
@@ -97,6 +98,7 @@ fn law_along<C: Cx, const TURNS: bool>(
             state: law.state,
         };
     }
+    // three rows: normal and tangents
     let (jar, jv) = (cx.load3(rows, r, row::JAR), cx.load3(rows, r, row::AHEAD));
     let mut there = jar;
     for i in 0..3 {
@@ -174,6 +176,7 @@ pub(super) fn residual<C: Cx, const TURNS: bool>(
                 jar = cx.sum_triples(t.memory.rows, r, first, &a[run.places()], jar);
             }
             cx.fill_all(t.memory.rows, r, place, jar);
+            // rotations about the normal and the tangents
             if let Some(block) = block_of::<_, TURNS>(class) {
                 let [x, y, z] = cx.load3(t.memory.rows, r, block + more::AREF);
                 let mut jar = [-x, -y, -z];
@@ -243,6 +246,7 @@ pub(super) fn changes<C: Cx, const TURNS: bool>(
                     turning::law_at(cx, t, r, block, ahead, None).state
                 }
             };
+            // a step to a sliding piece is not exact, since s is not quadratic there
             let slides = is_curved(t.cone, after);
             let moved = (before - after).abs() + slides;
             let more = cx.get(sum) + cx.only(moved);
@@ -259,6 +263,7 @@ pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, jo
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // f = -s' at the accelerations found, 0 in worlds without this contact; then its Jᵀ f
             if let Some(block) = block_of::<_, TURNS>(class) {
                 let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
                 let law = turning::law_at(cx, t, r, block, jar, None);
@@ -326,8 +331,10 @@ impl<C: Cx> LineStart<C> {
     /// Adds the law of a contact that may be held, by its power along the line, and its state.
     #[inline(always)]
     fn add_held(&mut self, cx: &mut C, model: [C::F; 2], here: [C::F; 2]) {
+        // (f of the model - f) · jv: how much more the true p'(0) is than the model's
         let more = cx.get(&self.more) + cx.only(model[0] - here[0]);
         cx.put(&mut self.more, more);
+        // the model and the true cost are on different pieces where the contact is held
         let held = cx.get(&self.held) + cx.only((model[1] - here[1]).abs());
         cx.put(&mut self.held, held);
     }
@@ -360,17 +367,21 @@ pub(super) fn begin_line<C: Cx, const TURNS: bool>(
         }
         each!(cx, r in list, {
             let (jar, ahead) = (cx.load3(t.memory.rows, r, row::JAR), cx.load3(t.memory.rows, r, row::AHEAD));
+            // the law of the model at a
             let holds = sticking(cx, t, r);
             let law = law_held(cx, t, r, jar, holds);
+            // jv = J s over the segment; 0 in worlds without this contact
             let mut jv = [C::F::c(0.0); 3];
             for i in 0..3 {
                 jv[i] = cx.only(ahead[i] - jar[i]);
             }
             cx.fill_all(t.memory.rows, r, row::AHEAD, jv);
+            // f · jv and jvᵀ W jv of the model
             let (power_here, bend) = (power(&law.force, jv), bend_along(&law, jv));
             let more = cx.get(&start.descent) + cx.only(bend);
             cx.put(&mut start.descent, more);
             cx.fill_all(t.memory.rows, r, row::POWER, [power_here, bend]);
+            // a held contact: how its true force at a differs from the model's
             if holds.is_some() {
                 let here = law_at(cx, t, r, jar);
                 let power = power(&here.force, jv);
@@ -406,6 +417,7 @@ fn begin_turning_line<C: Cx>(
     start: &mut LineStart<C>,
 ) {
     let rows = t.memory.rows;
+    // as in `begin_line`, over six rows
     let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
     let ahead = turning::six(cx, t, r, row::AHEAD, block + more::AHEAD);
     let holds = sticking(cx, t, r);
@@ -417,19 +429,23 @@ fn begin_turning_line<C: Cx>(
     let [a, b, c, d, e, f] = jv;
     cx.fill_all(rows, r, row::AHEAD, [a, b, c]);
     cx.fill_all(rows, r, block + more::AHEAD, [d, e, f]);
+    // jvᵀ W jv and f · jv of the model
     let bend = turning::dot(law.times(jv), jv);
     let sum = cx.get(&start.descent) + cx.only(bend);
     cx.put(&mut start.descent, sum);
     let power = turning::dot(law.force, jv);
     cx.fill_all(rows, r, row::POWER, [power, bend]);
+    // how the true force of a held contact differs
     if holds.is_some() {
         let here = turning::law_at(cx, t, r, block, jar, None);
         let there = turning::dot(here.force, jv);
         start.add_held(cx, [power, law.state], [there, here.state]);
     }
+    // coefficients of the squared slip along the line
     if t.cone == Cone::Elliptic {
         cx.fill_all(rows, r, row::SQUARES, turning::squares(jar, jv));
     }
+    // rounding of the terms of J a - aref, by the diagonal of W
     let aref = turning::six(cx, t, r, row::AREF, block + more::AREF);
     let mut all = C::F::c(0.0);
     for (i, stiff) in law.diagonal().into_iter().enumerate() {
@@ -453,6 +469,7 @@ pub(super) fn derivative<C: Cx, const TURNS: bool>(
     for k in 0..t.classes.len() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
+            // the law at α, against the quadratic piece of the model
             let here = law_along::<_, TURNS>(cx, t, &t.classes[k], r, alpha);
             let [state, power, bend] = cx.load3(t.memory.rows, r, row::STATE);
             // -p' of the quadratic model, whose force is power at α = 0
@@ -461,6 +478,7 @@ pub(super) fn derivative<C: Cx, const TURNS: bool>(
             // exactly 0 where the piece is the same quadratic, in spite of rounding
             let differs = C::F::c(0.5).lt(moved);
             let zero = C::F::c(0.0);
+            // p' gains (f of the model - f) · jv
             let more = C::F::select(differs, model - here.power, zero);
             let more = cx.only(more);
             let sum = cx.get(slope) + more;

@@ -45,6 +45,7 @@ impl<F: Num> Spread<F> {
             return None;
         }
         let groups = size.div_ceil(lanes);
+        // M(i, j), 0 where the pattern has no such entry
         let entry = |i: usize, j: usize| m.pattern.find(i, j).map_or(F::c(0.0), |at| mass[at]);
         let mut spread = Spread {
             lanes,
@@ -53,12 +54,14 @@ impl<F: Num> Spread<F> {
             mass: Vec::new(),
             diagonal: Vec::new(),
         };
+        // row i, a group at a time: lane l gets M(i, g n + l)
         for i in 0..size {
             let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
             for group in 0..groups {
                 spread.mass.push(group_values(cx, lanes, group, &row));
             }
         }
+        // M(j, j) of each lane's columns: what `stiffening` divides by
         let diagonal: Vec<F> = (0..size).map(|i| entry(i, i)).collect();
         for group in 0..groups {
             spread
@@ -75,12 +78,14 @@ impl<F: Num> Spread<F> {
 
     /// y = M x, the same in all lanes.
     pub fn multiply<C: Cx<F = F>>(&self, cx: &mut C, x: &[F], y: &mut [F]) {
+        // M is symmetric: a lane's column times x is the entry of M x for its dof
         let mut products = vec![F::c(0.0); self.groups];
         for (row, x) in self.mass.chunks_exact(self.groups).zip(x) {
             for (product, entry) in products.iter_mut().zip(row) {
                 *product = entry.fma(*x, *product);
             }
         }
+        // all lanes get the entry of each dof from its owner
         for (dof, y) in y.iter_mut().enumerate() {
             *y = self.of_owner(cx, &products, dof);
         }
@@ -100,7 +105,9 @@ impl<F: Num> Spread<F> {
         hold: Option<Hold<C>>,
     ) -> F {
         let (size, groups, lanes) = (self.size, self.groups, self.lanes);
+        // entry (i, j) of Jᵀ W J of joint rows and ties, 0 outside of the pattern
         let entry = |i: usize, j: usize| m.pattern.find(i, j).map_or(F::c(0.0), |at| joints[at]);
+        // M and the joint rows: a cell for each entry, since the loops over contacts add to cells
         let mut cells: Vec<C::V> = Vec::with_capacity(size * groups);
         for i in 0..size {
             let row: Vec<F> = (0..size).map(|j| entry(i, j)).collect();
@@ -109,16 +116,19 @@ impl<F: Num> Spread<F> {
                 cells.push(cx.var(self.mass[i * groups + group] + more));
             }
         }
+        // the right-hand side: each lane has the entries of its own columns
         let mut sides: Vec<C::V> = Vec::with_capacity(groups);
         for group in 0..groups {
             let side = group_values(cx, lanes, group, vector);
             sides.push(cx.var(side));
         }
+        // Jᵀ W J and Jᵀ f of contacts are added to both
         for class in 0..m.contacts.classes.len() {
             self.add_class(cx, &m.contacts, class, &mut cells, &mut sides, hold);
         }
         let mut matrix: Vec<F> = cells.iter().map(|cell| cx.get(cell)).collect();
         let mut side: Vec<F> = sides.iter().map(|cell| cx.get(cell)).collect();
+        // the right-hand side, the same in all lanes, before it is eliminated
         for (dof, pull) in pull.iter_mut().enumerate() {
             let x = self.of_owner(cx, &side, dof);
             cx.put(pull, x);
@@ -140,6 +150,7 @@ impl<F: Num> Spread<F> {
     ) {
         let (class, rows) = (&t.classes[k], t.memory.rows);
         let list = class_list(cx, t, k);
+        // W, f and the piece of each contact, into its row: each lane reads them for its columns
         each!(cx, r in list, {
             let jar = cx.load3(rows, r, row::JAR);
             let holds = hold.map(|hold| hold.of_contact(cx, t, r));
@@ -165,12 +176,14 @@ impl<F: Num> Spread<F> {
                 .any(|column| dofs.contains(&column.dof));
             columns.push(is_used.then(|| (cx.own(&places), cx.own(&has))));
         }
+        // the same contacts again, now by the columns of each lane
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
             let [nn, nx, ny] = cx.load3(rows, r, WEIGHT);
             let [xx, xy, yy] = cx.load3(rows, r, WEIGHT + 3);
             let weight = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
             let force = cx.load3(rows, r, PULL);
+            // per group: J(c) of the lane's dof, W J(c), and J(c) · f on the right-hand side
             let mut stiff = vec![None; self.groups];
             for (group, column) in columns.iter().enumerate() {
                 let Some((place, has)) = *column else { continue };
@@ -190,6 +203,7 @@ impl<F: Num> Spread<F> {
                 }
                 cx.put(&mut sides[group], sum);
             }
+            // entry (dof of c, lane's dof) += J(c) · W J of the lane's column
             for (c, column) in class.columns.iter().enumerate() {
                 let jacobian = cx.load3(rows, r, row::JACOBIAN + 3 * c);
                 for (group, stiff) in stiff.iter().enumerate() {
@@ -208,6 +222,7 @@ impl<F: Num> Spread<F> {
     /// The largest ratio of diagonal entries of a matrix and M.
     fn stiffening<C: Cx<F = F>>(&self, cx: &mut C, matrix: &[F]) -> F {
         let mut largest = F::c(1.0);
+        // of a group, lane l has its diagonal entry in row g n + l
         for group in 0..self.groups {
             let mut entries = Vec::new();
             let mut masses = Vec::new();
@@ -227,6 +242,7 @@ impl<F: Num> Spread<F> {
     fn eliminate<C: Cx<F = F>>(&self, cx: &mut C, matrix: &mut [F], side: &mut [F], x: &mut [F]) {
         let (size, groups, lanes) = (self.size, self.groups, self.lanes);
         let mut inverses = vec![F::c(0.0); size];
+        // H = Lᵀ D L from the last dof to the first: all lanes get the pivot and the side of k from its owner
         for k in (0..size).rev() {
             let (group_of_k, lane_of_k) = (k / lanes, k % lanes);
             let pivot = cx.of_lane(matrix[k * groups + group_of_k], lane_of_k);
@@ -244,6 +260,7 @@ impl<F: Num> Spread<F> {
                 side[group] = entry.fnma(x[k], side[group]);
                 lower.push(entry);
             }
+            // A(i, j) -= A(k, i) L(k, j)
             for i in 0..k {
                 // (k, i) instead of (i, k), which waits for the column before
                 let entry = self.of_owner(cx, &matrix[k * groups..], i);
@@ -253,6 +270,7 @@ impl<F: Num> Spread<F> {
                 }
             }
         }
+        // x(k) = (side(k) - Σ A(k, j) x(j) over j < k) / D(k); each lane keeps the sums of its own dofs
         let mut sums = vec![F::c(0.0); groups];
         for k in 0..size {
             let known = cx.of_lane(sums[k / lanes], k % lanes);
