@@ -21,6 +21,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
 ) {
     let class: &ClassOf<C> = &t.classes[k];
     let list = class_list(cx, t, k);
+    // a class with torsional friction has six rows per contact
     if let Some(block) = block_of::<_, TURNS>(class) {
         each!(cx, r in list, {
             let holds = hold.map(|hold| hold.of_contact(cx, t, r));
@@ -29,6 +30,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
         return;
     }
     each!(cx, r in list, {
+        // W and f at a, on the sticking piece where the contact is held; the line search reads the piece
         let jar = cx.load3(t.memory.rows, r, row::JAR);
         let holds = hold.map(|hold| hold.of_contact(cx, t, r));
         let law = law_held(cx, t, r, jar, holds);
@@ -45,6 +47,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
         for x in &mut pull {
             *x = cx.only(*x);
         }
+        // Jᵀ f
         if pulls {
             for run in &class.runs {
                 let first = row::JACOBIAN + 3 * run.column;
@@ -62,6 +65,7 @@ pub(super) fn assemble<C: Cx, const TURNS: bool>(
             add_three_columns(cx, t, r, stiff, [a, b, d], hessian);
             c += 3;
         }
+        // one or two columns that are left
         for (c, entries) in class.entries.iter().enumerate().skip(c) {
             let stiff = stiff_column(cx, t, r, &rows, c);
             add_column(cx, t, r, stiff, entries, hessian);
@@ -113,6 +117,7 @@ fn add_three_columns<C: Cx>(
     entries: [&[Run]; 3],
     hessian: &mut [C::V],
 ) {
+    // each column has one run, as long as the one before and one entry more: J is read once for three rows
     if let [[a], [b], [c]] = entries
         && a.place + a.len <= b.place
         && b.place + b.len <= c.place
@@ -141,12 +146,14 @@ fn assemble_turning<C: Cx>(
     holds: Option<MaskOf<C>>,
 ) {
     let rows = t.memory.rows;
+    // W and f of the six rows, and Jᵀ f
     let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
     let law = turning::law_at(cx, t, r, block, jar, holds);
     cx.fill(rows, r, row::STATE, law.state);
     if pulls {
         add_turning(cx, t, class, block, r, law.force, rhs);
     }
+    // W J(c), 0 in worlds without this contact, and its products with the columns up to c
     for (c, entries) in class.entries.iter().enumerate() {
         let (first, other) = (row::JACOBIAN + 3 * c, block + more::JACOBIAN + 3 * c);
         let column = turning::six(cx, t, r, first, other);

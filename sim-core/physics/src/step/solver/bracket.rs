@@ -40,6 +40,7 @@ struct Sums<F> {
 
 impl<F: Num> Sums<F> {
     fn add(&mut self, law: &Law<F>, jv: F, costs: [F; 2]) {
+        // s(α) - s(0); p' = -f jv, p'' = W jv², and |f jv|, whose rounding p' has
         self.cost = self.cost + (costs[1] - costs[0]);
         self.slope = law.force.fnma(jv, self.slope);
         self.curvature = (law.stiffness * jv).fma(jv, self.curvature);
@@ -101,6 +102,7 @@ impl<C: Cx> Point<C> {
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
         let mut moved = zero;
         for candidate in candidates {
+            // on the same side of the minimum, and nearer to it
             let (slope, candidate_slope) = (cx.get(&self.slope), cx.get(&candidate.slope));
             let rises = slope.lt(zero) & candidate_slope.lt(zero) & slope.lt(candidate_slope);
             let falls = zero.lt(slope) & zero.lt(candidate_slope) & candidate_slope.lt(slope);
@@ -195,12 +197,15 @@ pub(super) fn search<'a, C: Cx, const TURNS: bool>(
     let rounding = cx.get(&start.size) * epsilon::<C>() * C::F::c(ROUNDINGS);
     let arrived = cx.get(&start.slope).abs().lt(rounding);
     answer.take(cx, arrived, &start);
+    // Newton's first point: the answer where its slope is below the bound
     let alpha = start.newton(cx);
     let mut first = evaluations.point::<TURNS>(cx, alpha);
     let close = evaluations.is_close(cx, &first) & !arrived;
     answer.take(cx, close, &first);
+    // 1 where the minimum is ahead of the first point, -1 where that overshot
     let ahead = C::F::select(cx.get(&first.slope).lt(zero), one, -one);
     let mut second = first.copy(cx);
+    // Newton's method until the slope changes its sign; `second` is the point before `first`
     times!(cx, m.solver.ls_iterations, {
         let crossed = (-line.bound).lt(cx.get(&first.slope) * ahead);
         let spent = evaluations.are_spent(cx);
@@ -213,8 +218,10 @@ pub(super) fn search<'a, C: Cx, const TURNS: bool>(
         let close = evaluations.is_close(cx, &first);
         answer.take(cx, close, &first);
     });
+    // evaluations are spent: the last point is the answer
     let ends = evaluations.are_spent(cx) & !answer.has_ended(cx);
     answer.take(cx, ends, &first);
+    // the minimum is between the last two points
     let goes_on = !answer.has_ended(cx);
     when!(cx, goes_on, {
         shrink::<C, TURNS>(cx, &mut evaluations, &mut answer, [first, second]);
@@ -230,14 +237,17 @@ fn shrink<C: Cx, const TURNS: bool>(
     [mut first, mut second]: [Point<C>; 2],
 ) {
     let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
+    // Newton's method from the second end led to the first one
     let mut from_second = first.copy(cx);
     let alpha = first.newton(cx);
     let mut from_first = evaluations.point::<TURNS>(cx, alpha);
     times!(cx, evaluations.m.solver.ls_iterations, {
         let spent = evaluations.are_spent(cx);
         break_if!(cx, spent | answer.has_ended(cx));
+        // the third candidate is the middle
         let alpha = half * (cx.get(&first.alpha) + cx.get(&second.alpha));
         let middle = evaluations.point::<TURNS>(cx, alpha);
+        // of the candidates whose slope is below the bound, the one that costs least
         let mut answered = zero;
         for candidate in [&from_first, &from_second, &middle] {
             let costs_less = cx.get(&candidate.cost).lt(cx.get(&answer.cost));
@@ -247,9 +257,11 @@ fn shrink<C: Cx, const TURNS: bool>(
             answered = C::F::select(takes, one, answered);
         }
         break_if!(cx, half.lt(answered));
+        // each end moves to the best candidate on its side; both choose among the same three
         let before = from_first.copy(cx);
         let candidates = [&before, &from_second, &middle];
         let first_moved = first.advance(cx, candidates);
+        // from an end that moved Newton's method leads to another candidate
         when!(cx, first_moved, {
             let alpha = first.newton(cx);
             let next = evaluations.point::<TURNS>(cx, alpha).values(cx);
@@ -261,6 +273,7 @@ fn shrink<C: Cx, const TURNS: bool>(
             let next = evaluations.point::<TURNS>(cx, alpha).values(cx);
             from_second.set(cx, next);
         });
+        // no end moves: rounding is reached
         answer.take(cx, !first_moved & !second_moved, &middle);
     });
     // evaluations are spent: the end that costs less, if it costs less than the start
@@ -281,6 +294,7 @@ impl<F: Num> Segment<'_, F> {
     ) -> Point<C> {
         let half = F::c(0.5);
         let [slope, curvature] = self.gauss;
+        // ½ (a - M⁻¹ τ)ᵀ M (a - M⁻¹ τ) less that at α = 0, and its derivatives
         let mut sums = Sums {
             cost: alpha * (half * alpha).fma(curvature, slope),
             slope: alpha.fma(curvature, slope),
@@ -294,12 +308,14 @@ impl<F: Num> Segment<'_, F> {
             (jv, alpha.fma(jv, jar[r]))
         };
         let mut r = 0;
+        // equalities, s = ½ D jar²; both dofs are of one island
         for e in &m.equalities {
             let (jv, there) = change(r, e.follower);
             let costs = [jar[r], there].map(|jar| half * weight[r] * jar * jar);
             sums.add(&equality(there, weight[r]), jv, costs);
             r += 1;
         }
+        // dry friction: Huber's cost
         for friction in &m.frictions {
             let (jv, there) = change(r, friction.dof);
             let [zone, loss] = bounds(m, self.params, friction);
@@ -308,12 +324,14 @@ impl<F: Num> Segment<'_, F> {
             sums.add(&law, jv, costs);
             r += 1;
         }
+        // limits that act somewhere: s = ½ D jar² = -½ f jar where jar < 0
         for limit in self.acting.runs().flatten() {
             let r = r + limit;
             let (jv, there) = change(r, m.limits[limit].dof);
             let costs = [jar[r], there].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
             sums.add(&one_sided(there, weight[r]), jv, costs);
         }
+        // ties: all dofs of one are of one island, so the first one tells
         for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
             let tie = &m.ties[*tie];
             let Some(&dof) = tie.dofs.first() else {
@@ -323,6 +341,7 @@ impl<F: Num> Segment<'_, F> {
             let costs = [jar[r], there].map(|jar| ties::cost(&tie.law, jar, weight[r]));
             sums.add(&ties::law(&tie.law, there, weight[r]), jv, costs);
         }
+        // cells, to which the loops over contacts add
         let all = [sums.cost, sums.slope, sums.curvature, sums.size];
         let mut cells = all.map(|sum| cx.var(sum));
         contact_line::add::<_, TURNS>(cx, &m.contacts, self.island, alpha, &mut cells);

@@ -69,6 +69,7 @@ pub(super) fn add<C: Cx, const TURNS: bool>(
     for root in island.search.islands_of(island.labels.len()) {
         let here = island.has(root);
         when!(cx, here, {
+            // a class is listed with the first of its trees alone, so it is added once
             for &k in &island.search.classes[root] {
                 let class = &t.classes[k];
                 let list = class_list(cx, t, k);
@@ -78,6 +79,7 @@ pub(super) fn add<C: Cx, const TURNS: bool>(
                         None => {
                             let jar = cx.load3(t.memory.rows, r, row::JAR);
                             let jv = cx.load3(t.memory.rows, r, row::AHEAD);
+                            // the residual at α; the laws there and at α = 0
                             let mut there = jar;
                             for i in 0..3 {
                                 there[i] = alpha.fma(jv[i], jar[i]);

@@ -483,6 +483,7 @@ pub(super) fn derivative<C: Cx, const TURNS: bool>(
             let more = cx.only(more);
             let sum = cx.get(slope) + more;
             cx.put(slope, sum);
+            // the size of the terms, whose rounding p' has
             let sum = cx.get(size) + more.abs();
             cx.put(size, sum);
             // of the curvature likewise

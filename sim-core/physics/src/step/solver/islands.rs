@@ -27,12 +27,14 @@ pub(super) fn find<C: Cx>(
     let w = &mut b.work;
     let (island, weight) = (&mut w.island, &w.row_weight);
     let dofs = m.dofs.len();
+    // each tree by itself, and not constrained yet: its first dof + n
     for (island, root) in island.iter_mut().zip(&search.roots) {
         *island = C::F::c((root + dofs) as f64);
     }
     let mut links = Links { search, island };
     let zero = C::F::c(0.0);
     let mut r = 0;
+    // a row with D > 0 constrains its trees; an equality makes one island of its two trees
     for e in &m.equalities {
         links.add(cx, [e.follower, e.leader], zero.lt(weight[r]));
         r += 1;
@@ -41,9 +43,11 @@ pub(super) fn find<C: Cx>(
         links.add(cx, [f.dof], zero.lt(weight[r]));
         r += 1;
     }
+    // limits, where they act
     for l in acting.runs().flatten() {
         links.add(cx, [m.limits[l].dof], zero.lt(weight[r + l]));
     }
+    // ties and classes of contacts make one island of the trees of all their dofs
     for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
         let dofs = m.ties[*tie].dofs.iter().copied();
         links.add(cx, dofs, zero.lt(weight[r]));
@@ -52,6 +56,7 @@ pub(super) fn find<C: Cx>(
         let some = C::F::c(0.5).lt(contacts::count_of_class(cx, &m.contacts, k));
         links.add(cx, class.columns.iter().map(|column| column.dof), some);
     }
+    // MuJoCo's option `island` is off: all dofs are one island where any constraint acts
     if !search.islands {
         let constrained = links.any_constrained::<C>();
         for island in &mut *links.island {
@@ -78,6 +83,7 @@ impl<F: Num> Links<'_, F> {
         if !cx.anywhere(acts) {
             return;
         }
+        // the lowest label of these trees, n subtracted: a constraint acts on them now
         let roots = dofs.into_iter().map(|dof| self.search.roots[dof]);
         let count = F::c(self.island.len() as f64);
         let mut least = count + count;
@@ -85,6 +91,7 @@ impl<F: Num> Links<'_, F> {
             let current = self.island[root];
             least = least.min(F::select(current.lt(count), current, current - count));
         }
+        // each dof with the label of one of these trees gets it; roots that repeat are skipped
         let mut last = None;
         for root in roots {
             if last == Some(root) {
@@ -101,6 +108,7 @@ impl<F: Num> Links<'_, F> {
 
     /// Whether any constraint acts.
     fn any_constrained<C: Cx<F = F>>(&self) -> MaskOf<C> {
+        // a label below n: see `add`
         let count = F::c(self.island.len() as f64);
         let mut least = count;
         for island in &*self.island {
@@ -126,6 +134,7 @@ pub(super) fn trace<C: Cx>(
 ) -> C::F {
     let zero = C::F::c(0.0);
     let mut sum = zero;
+    // Σ M(j, j), tree by tree
     for segment in island.search.segments() {
         let here = island.has(segment.start);
         if cx.anywhere(here) {
@@ -146,6 +155,7 @@ pub(super) fn trace<C: Cx>(
             let mut axis = [zero; 3];
             axis[i] = C::F::c(1.0);
             let shift = w.origin[k].cross(Vec3(axis));
+            // 2 M(angular i, linear) · shift + shiftᵀ M(linear, linear) shift, with shift = origin × eᵢ
             for row in 0..3 {
                 let cross = entry(m, w, dof + 3 + i, dof + row);
                 more = (cross + cross).fma(shift.0[row], more);
@@ -180,6 +190,7 @@ pub(super) fn norm<C: Cx>(
     step: &[C::F],
 ) -> C::F {
     let mut sum = dot(cx, island, step, step);
+    // the linear half becomes a' = a - α × r; a difference of accelerations has no ω × (ω × r), and Rᵀ keeps norms
     for (k, dof) in free_bodies(m) {
         let here = island.has(dof);
         if cx.anywhere(here) {
@@ -202,6 +213,7 @@ pub(super) fn force_norm<C: Cx>(
     force: &[C::F],
 ) -> C::F {
     let mut sum = dot(cx, island, force, force);
+    // the torque becomes τ' = Rᵀ (τ + r × f), and Rᵀ keeps its norm
     for (k, dof) in free_bodies(m) {
         let here = island.has(dof);
         if cx.anywhere(here) {

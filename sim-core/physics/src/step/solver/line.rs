@@ -51,6 +51,7 @@ struct Sums<F> {
 impl<F: Num> Sums<F> {
     #[inline(always)]
     fn add(&mut self, law: Law<F>, jar: F, jv: F, aref: F) {
+        // jvᵀ W jv; |f jv|, a term of p'; W (|J a| + |aref|)², for `Line::noise`
         self.descent = (law.stiffness * jv).fma(jv, self.descent);
         self.size = self.size + (law.force * jv).abs();
         let rounded = (jar + aref).abs() + aref.abs();
@@ -83,12 +84,14 @@ impl<'a, F: Num> Line<'a, F> {
         let (weight, aref) = (&w.row_weight, &w.row_aref);
         let (jar, jv) = (&w.jar, &w.jar_minimum);
         let epsilon = F::c(<F::Real as Real>::EPSILON);
+        // sums over the rows at α = 0, on top of those of the smooth forces
         let mut sums = Sums {
             descent: curvature,
             size: curvature,
             terms: power,
         };
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+        // joint rows in their order, then ties
         for r in 0..frictions {
             sums.add(equality(jar[r], weight[r]), jar[r], jv[r], aref[r]);
         }
@@ -111,8 +114,10 @@ impl<'a, F: Num> Line<'a, F> {
             size,
             terms,
         } = sums;
+        // rounding of p'; in worlds that correct, the gain that rounding of the gradient promises
         let mut noise = size * epsilon;
         let (mut more, mut held) = (F::c(0.0), F::c(0.0));
+        // contacts add to cells; held ones tell how much the true slope differs from the model's
         if let Some(corrects) = corrects {
             let mut start = LineStart {
                 descent: cx.var(descent),
@@ -147,6 +152,7 @@ impl<'a, F: Num> Line<'a, F> {
         m: &Constants<F::Real>,
         alpha: F,
     ) -> Derivative<F> {
+        // the quadratic model: p' = -(1 - α) d, p'' = d
         let rest = F::c(1.0) - alpha;
         let slope = -(rest * self.descent);
         let mut d = Derivative {
@@ -157,10 +163,12 @@ impl<'a, F: Num> Line<'a, F> {
         // equalities have one piece only; of the others those of joints are distinguished once, not row by row
         let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
         let (weight, jar, jv) = (self.weight, self.jar, self.jv);
+        // lanes that share a world divide the joint rows among them
         let shares = cx.lanes() > 1;
         if shares {
             self.add_lane_rows(cx, alpha, &mut d);
         }
+        // what each row that left its piece adds: p' by (f(model) - f) jv, p'' by (W - W(0)) jv²
         for (r, friction) in (frictions..limits).zip(&m.frictions) {
             if shares {
                 break;
@@ -182,12 +190,14 @@ impl<'a, F: Num> Line<'a, F> {
                 d.add(alpha, *jv, start, here);
             }
         }
+        // all lanes add all ties
         for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
             let law = &m.ties[*tie].law;
             let start = ties::law(law, jar[r], weight[r]);
             let here = ties::law(law, alpha.fma(jv[r], jar[r]), weight[r]);
             d.add(alpha, jv[r], start, here);
         }
+        // contacts add to cells
         if self.touches {
             let mut slope = cx.var(d.slope);
             let mut curvature = cx.var(d.curvature);
@@ -213,6 +223,7 @@ impl<F: Num> Line<'_, F> {
             curvature: zero,
             size: zero,
         };
+        // the rows of this lane, then sums over the lanes in a fixed order
         for row in self.lane_rows {
             let here = row.law(alpha);
             let start = Law { ..row.start };
@@ -229,6 +240,7 @@ impl<F: Num> Derivative<F> {
     /// the piece is the same, in spite of rounding.
     #[inline(always)]
     fn add(&mut self, alpha: F, jv: F, start: Law<F>, here: Law<F>) {
+        // the model continues the piece of α = 0; a row that is on another one adds the difference of its force
         let model = (start.stiffness * alpha).fnma(jv, start.force);
         let moved = F::c(0.5).lt((here.state - start.state).abs());
         let power = F::select(moved, (model - here.force) * jv, F::c(0.0));
@@ -258,11 +270,13 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
 ) {
     let (zero, half, one) = (C::F::c(0.0), C::F::c(0.5), C::F::c(1.0));
     let resolution = C::F::c(4.0 * <<C::F as Num>::Real as Real>::EPSILON);
+    // the reference searches down to rounding
     let slack = if <<C::F as Num>::Real as Real>::DOUBLE {
         0.0
     } else {
         SLACK
     };
+    // a bracket with the start below the minimum, and no end above it yet
     let mut low = cx.var(zero);
     let mut low_slope = cx.var(line.slope);
     let mut high = cx.var(C::F::c(FAR));
@@ -270,6 +284,7 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
     // -1 after a point below the minimum, 1 after one above it
     let mut side = cx.var(zero);
     let mut last_move = cx.var(one);
+    // where the cost rises at once, α = 0
     let climbs = !line.slope.lt(zero);
     let start = C::F::select(climbs, zero, cx.get(length));
     cx.set(length, start);
@@ -277,14 +292,17 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         cx.tally(counts.0, counts.1);
         let alpha = cx.get(length);
         let d = line.derivative::<C, TURNS>(cx, m, alpha);
+        // the slope tells which end the point replaces
         let falls = d.slope.lt(zero);
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);
+        // arrived where p' is rounding, or small against p'(0); or where the bracket is as narrow as rounding
         let close = (d.size * resolution).max(-line.slope * C::F::c(slack));
         let arrived = climbs | !close.lt(d.slope.abs());
         break_if!(cx, arrived | (above - below).lt(above * resolution));
         cx.set(&mut low, below);
         cx.set(&mut high, above);
+        // Illinois method: the slopes at both ends
         let before = cx.get(&side);
         let now = C::F::select(falls, -one, one);
         // an end that stays for the second time has half its slope
@@ -295,11 +313,13 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         cx.set(&mut low_slope, below_slope);
         cx.set(&mut high_slope, above_slope);
 
+        // Newton's point, if it is inside and, once there are two ends, moves at most half as far as the last step
         let newton = alpha - d.slope.div(d.curvature);
         let is_open = C::F::c(0.5 * FAR).lt(above);
         let halves = (newton - alpha).abs().lt(half * cx.get(&last_move));
         let inside = below.lt(newton) & newton.lt(above);
         let is_newton = inside & (is_open | halves);
+        // else the chord's zero, or the middle where that is outside
         let rise = above_slope - below_slope;
         let chord = below.fma(above_slope, -(above * below_slope)).div(rise);
         let is_chord = below.lt(chord) & chord.lt(above);

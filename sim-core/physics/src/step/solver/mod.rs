@@ -150,7 +150,8 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         choose_start::<C, TURNS>(cx, m, b, acting);
     }
     let acts = acts(cx, m, &b.efc_weight);
-    // contacts are so stiff that M is lost in the rounding of H a⁺: worlds with contacts solve for the correction a⁺ - a
+    // contacts are so stiff that M is lost in the rounding of H a⁺:
+    // worlds with contacts solve for the correction a⁺ - a
     let corrects = contacts::touching(cx, &m.contacts);
     let coupling = linear::coupling(cx, m, corrects);
     // a constant first: precisions that never run this are compiled without it

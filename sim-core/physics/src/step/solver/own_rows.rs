@@ -42,11 +42,13 @@ pub(super) fn own_rows<C: Cx>(
     }
     let lanes = cx.lanes();
     let (frictions, limits) = (m.equalities.len(), m.equalities.len() + m.frictions.len());
+    // a row for each lane, from as many rows that follow each other
     let mut add = |cx: &mut C, part: std::ops::Range<usize>, bounds: Option<[Vec<C::F>; 2]>| {
         let mut by_lane = |values: &[C::F]| cx.own(values);
         let [jar, jv, weight] =
             [&w.jar, &w.jar_minimum, &w.row_weight].map(|values| by_lane(&values[part.clone()]));
         let bounds = bounds.map(|both| both.map(|values| by_lane(&values)));
+        // the law at α = 0 needs the other fields, so another one holds its place
         let start = equality(jar, weight);
         let mut row = OwnRow {
             jar,
@@ -58,6 +60,7 @@ pub(super) fn own_rows<C: Cx>(
         row.start = row.law(C::F::c(0.0));
         rows.push(row);
     };
+    // dry friction, with zone and loss of each lane's row
     for first in (frictions..limits).step_by(lanes) {
         let part = first..limits.min(first + lanes);
         let of_rows = &m.frictions[part.start - frictions..part.end - frictions];
@@ -65,6 +68,7 @@ pub(super) fn own_rows<C: Cx>(
         let both = [0, 1].map(|k| both.iter().map(|row| row[k]).collect());
         add(cx, part, Some(both));
     }
+    // limits, whether they act or not: one that does not has weight 0
     for first in (limits..m.joint_rows()).step_by(lanes) {
         add(cx, first..m.joint_rows().min(first + lanes), None);
     }

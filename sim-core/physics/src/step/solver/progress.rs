@@ -167,7 +167,8 @@ impl<C: Cx> Progress<C> {
         {
             trusted = trusted & !corrects;
         }
-        // on straight pieces the step is exact but for its rounding; inverse dynamics will correct that, if the model needs it
+        // on straight pieces the step is exact but for its rounding;
+        // inverse dynamics will correct that, if the model needs it
         let rounding = match m.solver.refinements {
             0 => stiffening * C::F::c(SOLVED * <<C::F as Num>::Real as Real>::EPSILON),
             _ => C::F::c(0.0),

@@ -45,9 +45,11 @@ impl Acting {
     /// From the weights of all rows, 0 where a limit does not act. A backend that cannot know has all of them.
     #[inline(always)]
     pub fn find<C: Cx>(cx: &mut C, m: &Constants<<C::F as Num>::Real>, weight: &[C::F]) -> Acting {
+        // at most 64 groups, a bit each
         let limits = &weight[m.equalities.len() + m.frictions.len()..m.joint_rows()];
         let size = limits.len().div_ceil(u64::BITS as usize).max(1);
         let mut groups = 0;
+        // a group acts if one of its limits has D > 0 in some world of the block
         for (k, group) in limits.chunks(size).enumerate() {
             let mut stiffest = C::F::c(0.0);
             for weight in group {
@@ -83,6 +85,7 @@ impl Iterator for Runs {
         if *groups == 0 {
             return None;
         }
+        // the lowest run of groups that act
         let first = groups.trailing_zeros() as usize;
         let end = first + (*groups >> first).trailing_ones() as usize;
         // the carry takes the run with it
@@ -115,6 +118,7 @@ pub(super) fn equality<F: Num>(jar: F, weight: F) -> Law<F> {
 #[inline(always)]
 pub(super) fn dry_friction<F: Num>(jar: F, weight: F, zone: F, loss: F) -> Law<F> {
     let (zero, one) = (F::c(0.0), F::c(1.0));
+    // beyond the zone the force is at its bound, against jar
     let (below, above) = (jar.lt(-zone), zone.lt(jar));
     let slides = below | above;
     let bound = F::select(below, loss, -loss);
@@ -135,6 +139,7 @@ pub(super) fn bounds<F: Num>(
     if m.varying.first(Param::JointFriction).is_none() {
         return [F::k(friction.zone), F::k(friction.loss)];
     }
+    // a loss that varies moves the edge of the zone, R × loss
     let loss = param(m, params, Param::JointFriction, friction.dof, friction.loss);
     [loss * F::k(friction.regularizer), loss]
 }
@@ -143,6 +148,7 @@ pub(super) fn bounds<F: Num>(
 #[inline(always)]
 pub(super) fn dry_cost<F: Num>(jar: F, weight: F, zone: F, loss: F) -> F {
     let (half, size) = (F::c(0.5), jar.abs());
+    // both pieces have the cost ½ loss × zone at the edge of the zone
     let inside = half * weight * jar * jar;
     let outside = loss * half.fnma(zone, size);
     F::select(zone.lt(size), outside, inside)
@@ -171,6 +177,7 @@ pub(super) fn residual<F: Num>(
     jar: &mut [F],
 ) {
     let mut r = 0;
+    // J = (1, -ratio) of an equality, J = 1 of a friction
     for e in &m.equalities {
         jar[r] = F::k(e.multiplier).fnma(a[e.leader], a[e.follower]) - aref[r];
         r += 1;
@@ -179,6 +186,7 @@ pub(super) fn residual<F: Num>(
         jar[r] = a[f.dof] - aref[r];
         r += 1;
     }
+    // J = ± 1 of the limits that act; the others keep what they had, and are not read
     for run in jacobian.acting.runs() {
         let limits = m.limits[run.clone()]
             .iter()
@@ -195,6 +203,7 @@ pub(super) fn residual<F: Num>(
 /// f + W J a, or f alone where the solver `corrects`.
 #[inline(always)]
 pub(super) fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
+    // f + W J a, with J a = jar + aref
     let whole = law.stiffness.fma(jar + aref, law.force);
     match corrects {
         Some(corrects) => F::select(corrects, law.force, whole),
@@ -239,6 +248,7 @@ pub(super) fn assemble<F: Num>(
         rhs[f.dof] = rhs[f.dof] + pull(&law, jar[r], aref[r], corrects);
         r += 1;
     }
+    // limits that act: J = ± 1 cancels in Jᵀ W J
     for run in acting.runs() {
         let limits = m.limits[run.clone()].iter().zip(&side[run.clone()]);
         for ((l, side), r) in limits.zip(r + run.start..) {
@@ -275,6 +285,7 @@ pub(super) fn changes<F: Num>(
         turned = turned + F::select(one.lt(moved), one, zero);
         r += 1;
     }
+    // a limit changes when it begins or ends to push
     for run in acting.runs() {
         let rows = r + run.start..r + run.end;
         let places = jar[rows.clone()].iter().zip(&other[rows.clone()]);
@@ -285,6 +296,7 @@ pub(super) fn changes<F: Num>(
         }
     }
     r = m.joint_rows();
+    // ties: a friction that reverses changes its state by 2, as above
     for tie in &m.ties {
         for _ in 0..tie.rows {
             let before = ties::law(&tie.law, jar[r], weight[r]).state;
@@ -309,21 +321,25 @@ pub(super) fn forces<F: Num>(
     joint: &mut [F],
 ) {
     let mut r = 0;
+    // equalities: J = (1, -ratio)
     for e in &m.equalities {
         force[r] = equality(jar[r], weight[r]).force;
         joint[e.follower] = joint[e.follower] + force[r];
         joint[e.leader] = F::k(e.multiplier).fnma(force[r], joint[e.leader]);
         r += 1;
     }
+    // frictions: J = 1
     for f in &m.frictions {
         let [zone, loss] = bounds(m, params, f);
         force[r] = dry_friction(jar[r], weight[r], zone, loss).force;
         joint[f.dof] = joint[f.dof] + force[r];
         r += 1;
     }
+    // 0 for all limits, since those that act in no world have no row
     for force in &mut force[r..m.joint_rows()] {
         *force = F::c(0.0);
     }
+    // limits that act: J = ± 1
     for run in jacobian.acting.runs() {
         let limits = m.limits[run.clone()]
             .iter()
@@ -347,6 +363,7 @@ pub(super) fn cost<F: Num>(
     let half = F::c(0.5);
     let mut sum = F::c(0.0);
     let mut r = 0;
+    // ½ D jar² of equalities, Huber's cost of frictions
     for _ in &m.equalities {
         sum = (half * weight[r] * jar[r]).fma(jar[r], sum);
         r += 1;
@@ -361,6 +378,7 @@ pub(super) fn cost<F: Num>(
         let push = one_sided(jar[r], weight[r]).force;
         sum = (half * push).fnma(jar[r], sum);
     }
+    // ties follow all limits, those without a row included
     r = m.joint_rows();
     for tie in &m.ties {
         for _ in 0..tie.rows {

@@ -10,6 +10,7 @@ use crate::lane::Num;
 pub(super) fn law<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> Law<F> {
     match law {
         TieLaw::Equality(_) => equality(jar, weight),
+        // Huber's zone is R × loss, with R = 1/D
         TieLaw::Friction(loss) => {
             let loss = F::k(*loss);
             dry_friction(jar, weight, loss.div(weight), loss)
@@ -28,6 +29,7 @@ pub(super) fn cost<F: Num>(law: &TieLaw<F::Real>, jar: F, weight: F) -> F {
             let loss = F::k(*loss);
             dry_cost(jar, weight, loss.div(weight), loss)
         }
+        // ½ D jar² = -½ f jar where the range pushes
         TieLaw::Range(_) => -(half * one_sided(jar, weight).force * jar),
     }
 }
@@ -67,6 +69,7 @@ pub(super) fn assemble<F: Num>(
     let mut r = m.joint_rows();
     for tie in &m.ties {
         for row in 0..tie.rows {
+            // stiffness and pull of the row; then Jᵀ W J of each dof with those up to it
             let law = law(&tie.law, jar[r], weight[r]);
             let pull = pull(&law, jar[r], aref[r], corrects);
             let entries = &jacobian[tie.jacobian(row)];
@@ -95,6 +98,7 @@ pub(super) fn forces<F: Num>(
     let mut r = m.joint_rows();
     for tie in &m.ties {
         for row in 0..tie.rows {
+            // f = -s', and Jᵀ f on the dofs of the tie
             force[r] = law(&tie.law, jar[r], weight[r]).force;
             for (entry, &dof) in jacobian[tie.jacobian(row)].iter().zip(&tie.dofs) {
                 joint[dof] = entry.fma(force[r], joint[dof]);

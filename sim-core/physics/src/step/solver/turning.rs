@@ -33,12 +33,14 @@ impl<F: Num> TurningLaw<F> {
     /// W u.
     #[inline(always)]
     pub fn times(&self, u: [F; 6]) -> [F; 6] {
+        // nn u₀ + c · u, and the part of u along d
         let mut first = self.normal * u[0];
         let mut aligned = F::c(0.0);
         for i in 0..5 {
             first = self.cross[i].fma(u[i + 1], first);
             aligned = self.direction[i].fma(u[i + 1], aligned);
         }
+        // c u₀ + diag u + along d (d · u)
         let aligned = aligned * self.along;
         let mut product = [first; 6];
         for i in 0..5 {
@@ -92,6 +94,7 @@ pub(super) fn law_at<C: Cx>(
             elliptic(t.impratio, jar, [stiff, soft, mu], holds)
         }
         Cone::Pyramidal => {
+            // which of the rotations have friction differs from contact to contact
             let exists = cx.load3(t.memory.rows, r, block + turning::EXISTS);
             pyramidal(jar, stiff, mu, exists)
         }
@@ -129,9 +132,12 @@ fn elliptic<F: Num>(
 ) -> TurningLaw<F> {
     let (zero, one, half) = (F::c(0.0), F::c(1.0), F::c(0.5));
     let ratio = impratio.to_f64();
+    // slip as in `cones::elliptic`, over five directions
     let [square, ..] = squares(jar, jar);
     let slip = square.sqrt();
+    // slip > 0 where a contact slides; elsewhere the quotient is not used
     let inverse = one.div(F::select(zero.lt(slip), slip, one));
+    // separated, sticking or held, sliding: masks that exclude each other
     let excess = mu.fnma(slip, jar[0]);
     let leaves = !excess.lt(zero);
     let mut sticks = !zero.lt(mu.fma(jar[0], slip * F::c(ratio)));
@@ -141,11 +147,13 @@ fn elliptic<F: Num>(
     let acts = !leaves & zero.lt(stiff);
     let (sticks, slides) = (acts & sticks, acts & !sticks);
     let by_piece = |stick, slide| F::select(sticks, stick, F::select(slides, slide, zero));
+    // impratio D of friction that sticks; a contact that slides pushes along the normal, and by μ push against d
     let across = stiff * F::c(ratio);
     let push = -(soft * excess);
     let rub = soft * mu;
     let turn = (push * mu) * inverse;
     let pull = -(push * mu);
+    // W = diag(stiff, across …) where it sticks; where it slides, soft (1, -μ d)(1, -μ d)ᵀ + turn (1 - d dᵀ)
     let mut law = TurningLaw {
         force: [by_piece(-(stiff * jar[0]), push); 6],
         state: by_piece(one, F::c(2.0)),
@@ -160,6 +168,7 @@ fn elliptic<F: Num>(
         along: by_piece(zero, rub * mu - turn),
         direction: [zero; 5],
     };
+    // c, d and the force along each direction of friction
     for i in 0..5 {
         let d = jar[i + 1] * inverse;
         law.direction[i] = d;
@@ -185,10 +194,12 @@ fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw
         direction: [zero; 5],
     };
     for i in 0..5 {
+        // the tangents always have edges; a rotation has them if the contact has its friction
         let edge_stiffness = match i {
             0 | 1 => stiff,
             _ => stiff * exists[i - 2],
         };
+        // two edges jar₀ ± μ jarᵢ, each on where it pushes; bits 2 i and 2 i + 1 tell
         let side = mu * jar[i + 1];
         let edges = [jar[0] + side, jar[0] - side];
         let (mut push, mut active) = ([zero; 2], [zero; 2]);
@@ -201,6 +212,7 @@ fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw
             law.state = law.state + F::select(on, bit, zero);
             law.cost = law.cost - half * push[e] * edge;
         }
+        // edges have J = (1, ± μ): W and f sum over all of them
         law.force[0] = law.force[0] + (push[0] + push[1]);
         law.force[i + 1] = mu * (push[0] - push[1]);
         law.normal = law.normal + (active[0] + active[1]);
