@@ -331,7 +331,7 @@ impl<F: Num> Segment<'_, F> {
             let costs = [jar[r], there].map(|jar| -(half * one_sided(jar, weight[r]).force * jar));
             sums.add(&one_sided(there, weight[r]), jv, costs);
         }
-        // ties: all dofs of one are of one island, so the first one tells
+        // ties: all dofs of one are of one island, so the first one stands for all
         for (r, tie) in (m.joint_rows()..m.rows()).zip(&m.tie_of_row) {
             let tie = &m.ties[*tie];
             let Some(&dof) = tie.dofs.first() else {

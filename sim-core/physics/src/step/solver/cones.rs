@@ -165,7 +165,7 @@ pub(super) fn pyramidal<F: Num>(jar: [F; 3], stiff: F, mu: F) -> ConeLaw<F> {
     let mut push = [zero; 4];
     let mut active = [zero; 4];
     let (mut state, mut cost) = (zero, zero);
-    // edges jar₀ ± μ jar₁, jar₀ ± μ jar₂: s = ½ D edge² = -½ force · edge where it pushes; bit i tells that it does
+    // edges jar₀ ± μ jar₁, jar₀ ± μ jar₂: s = ½ D edge² = -½ force · edge where it pushes; bit i is set then
     for (i, edge) in [jar[0] + a, jar[0] - a, jar[0] + b, jar[0] - b]
         .into_iter()
         .enumerate()

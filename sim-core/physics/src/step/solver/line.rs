@@ -117,7 +117,7 @@ impl<'a, F: Num> Line<'a, F> {
         // rounding of p'; in worlds that correct, the gain that rounding of the gradient promises
         let mut noise = size * epsilon;
         let (mut more, mut held) = (F::c(0.0), F::c(0.0));
-        // contacts add to cells; held ones tell how much the true slope differs from the model's
+        // contacts add to cells; held ones give the difference of the true slope and the model's
         if let Some(corrects) = corrects {
             let mut start = LineStart {
                 descent: cx.var(descent),
@@ -292,7 +292,7 @@ pub(super) fn search<C: Cx, const TURNS: bool>(
         cx.tally(counts.0, counts.1);
         let alpha = cx.get(length);
         let d = line.derivative::<C, TURNS>(cx, m, alpha);
-        // the slope tells which end the point replaces
+        // the sign of the slope decides which end the point replaces
         let falls = d.slope.lt(zero);
         let below = C::F::select(falls, alpha, cx.get(&low));
         let above = C::F::select(falls, cx.get(&high), alpha);

@@ -258,7 +258,7 @@ impl<C: Cx> Progress<C> {
             cx.set(&mut self.calm, C::F::select(again, zero, one));
         }
         cx.set(&mut self.busy, C::F::select(done, zero, one));
-        // a searched step that was taken: its slips tell which contacts the next model may hold
+        // a searched step that was taken: the next model holds contacts by its slips
         let moves = plan.searches & zero.lt(cx.get(&result.length));
         cx.set(&mut self.searched, C::F::select(moves, one, zero));
         done

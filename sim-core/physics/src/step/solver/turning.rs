@@ -199,7 +199,7 @@ fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw
             0 | 1 => stiff,
             _ => stiff * exists[i - 2],
         };
-        // two edges jar₀ ± μ jarᵢ, each on where it pushes; bits 2 i and 2 i + 1 tell
+        // two edges jar₀ ± μ jarᵢ, each on where it pushes; then bit 2 i or 2 i + 1 is set
         let side = mu * jar[i + 1];
         let edges = [jar[0] + side, jar[0] - side];
         let (mut push, mut active) = ([zero; 2], [zero; 2]);
