@@ -300,6 +300,7 @@ impl<C: Cx> Feature<C> for CylinderFeature<C::F> {
     #[inline(always)]
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
         let c = C::F::c;
+        // past the last corner the first again
         let place = cx.number(i);
         let inside = place.lt(self.count - c(0.5));
         let place = C::F::select(inside, place, c(0.0));

@@ -140,15 +140,15 @@ pub(in crate::step::collide) fn closest_points<C: Cx, R: Restart<C>>(
             on_a,
             w: w + away,
         };
-        let found: Distance<C::F> = gjk_distance(cx, a, b, &from, size, limit + shift);
-        let after = found.distance - shift * found.normal.dot(m);
+        let apart: Distance<C::F> = gjk_distance(cx, a, b, &from, size, limit + shift);
+        let after = apart.distance - shift * apart.normal.dot(m);
         let gained = (before + settled_at).lt(after);
         let (x, n) = (
             C::F::select(gained, after, before),
-            select(gained, found.normal, m),
+            select(gained, apart.normal, m),
         );
         // half-way between the closest points, B moved back
-        let middle = (found.way - away).scale_add(c(0.5), found.on_a);
+        let middle = (apart.way - away).scale_add(c(0.5), apart.on_a);
         progress.offer(cx, x, n, middle);
         let settled = !gained | (gap.lt(before) | limit.lt(x));
         if R::TRIES > 0 {

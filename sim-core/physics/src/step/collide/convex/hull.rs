@@ -52,7 +52,7 @@ impl<C: Cx> Copy for Hull<'_, C> {}
 
 /// A hull in another frame.
 pub(in crate::step::collide) struct PosedHull<'a, C: Cx> {
-    pub own: Hull<'a, C>,
+    pub hull: Hull<'a, C>,
     pub axes: Mat3<C::F>,
     pub center: Vec3<C::F>,
 }
@@ -158,7 +158,7 @@ impl<C: Cx> Support<C> for Hull<'_, C> {
 impl<C: Cx> Support<C> for PosedHull<'_, C> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let point = self.own.farthest(cx, self.axes.transpose_mul(d));
+        let point = self.hull.farthest(cx, self.axes.transpose_mul(d));
         self.axes.mul_add(point, self.center)
     }
 }

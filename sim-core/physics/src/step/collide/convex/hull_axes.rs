@@ -135,13 +135,13 @@ pub(in crate::step::collide) fn bounding_box_axis<F: Num, R: Reach<F>>(
     other: &R,
 ) -> SeparatingAxis<F> {
     let (axes, center) = (&pose.axes, pose.center);
-    let own = BoxReach(half);
+    let box_reach = BoxReach(half);
     let length = center.dot(center).sqrt();
     let apart = F::c(1e-12).lt(length);
     let ray = center * F::c(-1.0).div(length.max(F::c(1e-12)));
     let up = [F::c(0.0), F::c(0.0), F::c(1.0)];
     let normal = select(apart, ray, Vec3(up));
-    let distance = length - own.reach(normal) - other.reach(axes.transpose_mul(normal));
+    let distance = length - box_reach.reach(normal) - other.reach(axes.transpose_mul(normal));
     let mut best = SeparatingAxis { normal, distance };
     for i in 0..3 {
         let row = [axes[0][i], axes[1][i], axes[2][i]];
@@ -162,7 +162,7 @@ pub(in crate::step::collide) fn bounding_box_axis<F: Num, R: Reach<F>>(
         unit[j] = F::c(1.0);
         let height = center.dot(axes[j]);
         let normal = axes[j] * with_sign(F::c(-1.0), height);
-        let distance = height.abs() - own.reach(axes[j]) - other.reach(Vec3(unit));
+        let distance = height.abs() - box_reach.reach(axes[j]) - other.reach(Vec3(unit));
         best = better_axis(best, SeparatingAxis { normal, distance }, F::c(0.0));
     }
     best
@@ -345,8 +345,8 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
             when!(cx, reaches, {
                 let [n1x, n1y, n1z, n2x, n2y, n2z] = cx.constants(tables.edges, edge, 6);
                 let (n1, n2) = (Vec3([n1x, n1y, n1z]), Vec3([n2x, n2y, n2z]));
-                let own = HullEdge { point, along, outward: n1 + n2, normals: [n1, n2] };
-                self.edge_with_others(cx, edge, &own, &mut best, search);
+                let hull_edge = HullEdge { point, along, outward: n1 + n2, normals: [n1, n2] };
+                self.edge_with_others(cx, edge, &hull_edge, &mut best, search);
             });
         });
         let (x, old) = (cx.get(&best.distance), cx.get(&search.distance));
@@ -364,21 +364,21 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
         &self,
         cx: &mut C,
         edge: C::I,
-        own: &HullEdge<C::F>,
+        hull_edge: &HullEdge<C::F>,
         best: &mut EdgeSearch<C>,
         search: &mut Search<C>,
     ) {
         let c = C::F::c;
-        let (way, [n1, n2]) = (self.center - own.point, own.normals);
+        let (way, [n1, n2]) = (self.center - hull_edge.point, hull_edge.normals);
         for &j in R::EDGES {
             let q = self.axes[j];
             // the two edges make a face of the Minkowski difference
             let crosses = (n1.dot(q) * n2.dot(q)).lt(c(0.0));
             when!(cx, crosses, {
-                let axis = own.along.cross(q);
+                let axis = hull_edge.along.cross(q);
                 let square = axis.dot(axis);
                 let unit = c(1.0).div(square.max(c(1e-6)).sqrt());
-                let unit = axis * with_sign(unit, axis.dot(own.outward));
+                let unit = axis * with_sign(unit, axis.dot(hull_edge.outward));
                 let x = unit.dot(way) - self.reach(unit);
                 let old = cx.get(&best.distance);
                 // of nearly parallel edges the normal is that of a face

@@ -81,7 +81,7 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
     fn faces(&self, cx: &mut C, on_a: Vec3<C::F>, on_b: Vec3<C::F>, best: &mut BestAxis<C>) {
         let (first, second) = (&self.first, &self.second);
         let faces = second.tables.faces;
-        let (start, end) = first.own.span(cx, Part::Faces);
+        let (start, end) = first.hull.span(cx, Part::Faces);
         span!(cx, face in start, end, {
             let n = first.axes * Vec3(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3) + n.dot(first.center);
@@ -98,7 +98,7 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
             let bound = height + n.dot(on_a);
             when!(cx, bound.lt(cx.get(&best.depth)), {
                 let far = height + n.dot(first.center);
-                let depth = first.own.reach(cx, first.axes.transpose_mul(n)) + far;
+                let depth = first.hull.reach(cx, first.axes.transpose_mul(n)) + far;
                 best.offer(cx, depth, n);
             });
         });
@@ -115,7 +115,7 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
     ) {
         let (first, second) = (&self.first, &self.second);
         let table = second.tables.edges;
-        let (start, end) = first.own.span(cx, Part::Edges);
+        let (start, end) = first.hull.span(cx, Part::Edges);
         span!(cx, edge in start, end, {
             let n1 = first.axes * Vec3(cx.constants(table, edge, 6));
             let n2 = first.axes * Vec3(cx.constants(table, edge, 9));

@@ -24,7 +24,7 @@ const DEEP: f64 = 0.01;
 pub fn sphere_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (hull, b) = (pair.hull_b(), pair.pose_b);
     // in the frame of the hull, then back in that of the pair
-    let near = separation_by_axes(cx, &hull, &PosedSphere::of(pair), pair.margin);
+    let near = separation_by_axes(cx, &hull, &PosedSphere::from_pair(pair), pair.margin);
     let point = b.axes.mul_add(near.point, b.center);
     let normal = b.axes * near.normal;
     let touches = near.distance.lt(pair.margin);
@@ -35,7 +35,7 @@ pub fn sphere_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
 #[inline(always)]
 pub fn capsule_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let shapes = AgainstHull {
-        first: PosedCapsule::of(pair),
+        first: PosedCapsule::from_pair(pair),
         hull: pair.hull_b(),
     };
     add_convex_contacts(cx, pair, &shapes, out);
@@ -45,7 +45,7 @@ pub fn capsule_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points
 #[inline(always)]
 pub fn box_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let shapes = AgainstHull {
-        first: PosedBox::of(pair),
+        first: PosedBox::from_pair(pair),
         hull: pair.hull_b(),
     };
     add_convex_contacts(cx, pair, &shapes, out);
@@ -55,7 +55,7 @@ pub fn box_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>)
 #[inline(always)]
 pub fn cylinder_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let shapes = AgainstHull {
-        first: PosedCylinder::of(pair),
+        first: PosedCylinder::from_pair(pair),
         hull: pair.hull_b(),
     };
     add_convex_contacts(cx, pair, &shapes, out);
@@ -65,13 +65,13 @@ pub fn cylinder_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Point
 #[inline(always)]
 pub fn hull_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let pose = pair.pose_a_in_b();
-    let (second, own) = (pair.hull_b(), pair.hull_a());
+    let (second, first) = (pair.hull_b(), pair.hull_a());
     let shapes = TwoHulls {
         pose,
-        own,
+        first_hull: first,
         second,
-        half_extents: [own.half_extents(cx), second.half_extents(cx)],
-        radii: [own.radius(cx), second.radius(cx)],
+        half_extents: [first.half_extents(cx), second.half_extents(cx)],
+        radii: [first.radius(cx), second.radius(cx)],
         edges: pair.clip_tables.edges,
     };
     add_convex_contacts(cx, pair, &shapes, out);
@@ -169,7 +169,7 @@ struct TwoHulls<'a, C: Cx> {
     /// Pose of the first.
     pose: ShapePose<C::F>,
     /// Both in their own frames.
-    own: Hull<'a, C>,
+    first_hull: Hull<'a, C>,
     second: Hull<'a, C>,
     /// Half extents of their bounding boxes, and their radii [m].
     half_extents: [Vec3<C::F>; 2],
@@ -183,7 +183,7 @@ impl<'a, C: Cx> TwoHulls<'a, C> {
     #[inline(always)]
     fn first(&self) -> PosedHull<'a, C> {
         PosedHull {
-            own: self.own,
+            hull: self.first_hull,
             axes: self.pose.axes,
             center: self.pose.center,
         }
@@ -237,7 +237,7 @@ impl<'a, C: Cx> ConvexPair<C> for TwoHulls<'a, C> {
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, HullFace<'a, C::F>, HullFace<'a, C::F>> {
         // the faces that face each other along the normal
-        let first = HullFace::find(cx, &self.own, Some(self.pose), normal);
+        let first = HullFace::find(cx, &self.first_hull, Some(self.pose), normal);
         let second = HullFace::find(cx, &self.second, None, -normal);
         FeaturePair {
             flat: aligned(second.outward, normal) | aligned(first.outward, normal),

@@ -177,10 +177,10 @@ pub(in crate::step::collide) fn separation_by_axes<C: Cx, A: PosedShape<C>>(
         let inside = !c(0.0).lt(best.axis.distance);
         when!(cx, apart, {
             let start = best.axis.normal;
-            let found = closest_points(cx, &core, hull, start, size, limit, &NoRestart);
-            set3(cx, &mut normal, found.normal);
-            set3(cx, &mut point, found.point);
-            cx.set(&mut distance, found.distance);
+            let closest = closest_points(cx, &core, hull, start, size, limit, &NoRestart);
+            set3(cx, &mut normal, closest.normal);
+            set3(cx, &mut point, closest.point);
+            cx.set(&mut distance, closest.distance);
         });
         when!(cx, inside, {
             let x = deepest_point(cx, hull, shape, &core, &best);

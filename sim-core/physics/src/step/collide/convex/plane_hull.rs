@@ -85,7 +85,7 @@ fn add_widest<C: Cx>(
     };
     let deepest = view.deepest(cx, hull);
     when!(cx, deepest[2].lt(view.limit), {
-        let (spots, found) = view.choose(cx, hull, deepest);
+        let (spots, exists) = view.choose(cx, hull, deepest);
         for k in 0..4 {
             let x = get3(cx, &spots[k]);
             let distance = x[2] + height;
@@ -94,7 +94,7 @@ fn add_widest<C: Cx>(
                 x[0],
                 view.axes[1].scale_add(x[1], n * (x[2] - C::F::c(0.5) * distance)),
             );
-            let is = C::F::c(0.5).lt(cx.get(&found[k]));
+            let is = C::F::c(0.5).lt(cx.get(&exists[k]));
             let point = b.axes.mul_add(on_hull, b.center);
             out.add(cx, is, point, distance, normal);
         }
@@ -154,6 +154,7 @@ fn add_polygon<C: Cx>(
                 let is_other = c(0.5).lt((place - deepest).abs());
                 is = is & is_other & !same.lt(n.dot(x - origin));
             }
+            // half-way between vertex and plane
             let point = b.axes.mul_add(n.scale_add(distance * c(-0.5), x), b.center);
             out.add(cx, is, point, distance, normal);
         }
@@ -221,7 +222,7 @@ impl<F: Num> View<F> {
             var3(cx, Vec3::zero()),
             var3(cx, Vec3::zero()),
         ];
-        let mut found = [cx.var(one), cx.var(zero), cx.var(zero), cx.var(zero)];
+        let mut exists = [cx.var(one), cx.var(zero), cx.var(zero), cx.var(zero)];
         for count in 0..3 {
             let chosen: [Vec3<F>; 3] = [
                 get3(cx, &spots[0]),
@@ -230,9 +231,9 @@ impl<F: Num> View<F> {
             ];
             let (x, is) = self.farthest(cx, hull, count, chosen);
             set3(cx, &mut spots[count + 1], x);
-            cx.set(&mut found[count + 1], is);
+            cx.set(&mut exists[count + 1], is);
         }
-        (spots, found)
+        (spots, exists)
     }
 
     /// The deepest vertex; of those that are equally deep the first, so that a resting hull keeps its points. Far above, where
@@ -264,7 +265,7 @@ impl<F: Num> View<F> {
         chosen: [Vec3<F>; 3],
     ) -> (Vec3<F>, F) {
         let c = F::c;
-        let score = ReductionScore::of(count, chosen);
+        let score = ReductionScore::from_chosen(count, chosen);
         let mut best = cx.var(score.threshold(c(SPREAD) * self.size));
         // where none is found the first point stands in, and nothing is found after it
         let mut place = var3(cx, chosen[0]);

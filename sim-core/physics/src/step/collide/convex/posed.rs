@@ -121,7 +121,7 @@ pub(in crate::step::collide) fn unit_axes<F: Num>() -> Mat3<F> {
 impl<F: Num> PosedSphere<F> {
     /// The first shape of a pair.
     #[inline(always)]
-    pub fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+    pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
         let b = pair.pose_b;
         PosedSphere {
             pose: ShapePose {
@@ -136,7 +136,7 @@ impl<F: Num> PosedSphere<F> {
 impl<F: Num> PosedCapsule<F> {
     /// The first shape of a pair.
     #[inline(always)]
-    pub fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+    pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
         let (pose, a): (_, &Shape<C>) = (pair.pose_a_in_b(), &pair.a);
         PosedCapsule {
             pose,
@@ -150,7 +150,7 @@ impl<F: Num> PosedCapsule<F> {
 impl<F: Num> PosedBox<F> {
     /// The first shape of a pair.
     #[inline(always)]
-    pub fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+    pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
         PosedBox {
             pose: pair.pose_a_in_b(),
             half: pair.a.half_extents(),
@@ -161,7 +161,7 @@ impl<F: Num> PosedBox<F> {
 impl<F: Num> PosedCylinder<F> {
     /// The first shape of a pair.
     #[inline(always)]
-    pub fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+    pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
         PosedCylinder {
             pose: pair.pose_a_in_b(),
             radius: pair.a.radius(),
@@ -345,7 +345,7 @@ impl<C: Cx> FacetedShape<C> for PosedBox<C::F> {
         // the axes of box and cylinder, their products, and the line of centres, also straight out of the cylinder's side
         let mut start = axes.cylinder_axis();
         for j in 0..3 {
-            start = start.or(axes.own(j)).or(axes.across_both(j));
+            start = start.or(axes.first_axis(j)).or(axes.across_both(j));
         }
         let center = self.pose.center;
         start.or(axes.radial(center)).or(axes.along(center)).best
@@ -423,11 +423,14 @@ impl<C: Cx> FacetedShape<C> for PosedCylinder<C::F> {
         &self,
         axes: &StartAxes<'_, C::F, Self::Reach, CylinderReach<C::F>>,
     ) -> SeparatingAxis<C::F> {
-        let ShapePose { axes: own, center } = &self.pose;
+        let ShapePose {
+            axes: columns,
+            center,
+        } = &self.pose;
         // the axes of both, their product, and the line of centres, also straight out of either side
-        let across = own[2].scale_add(-own[2].dot(*center), *center);
+        let across = columns[2].scale_add(-columns[2].dot(*center), *center);
         axes.cylinder_axis()
-            .or(axes.own(2))
+            .or(axes.first_axis(2))
             .or(axes.across_both(2))
             .or(axes.radial(*center))
             .or(axes.along(across))
@@ -437,19 +440,19 @@ impl<C: Cx> FacetedShape<C> for PosedCylinder<C::F> {
     #[inline(always)]
     fn with_cylinder(
         &self,
-        own: CylinderFeature<C::F>,
-        other: CylinderFeature<C::F>,
+        feature: CylinderFeature<C::F>,
+        cylinder: CylinderFeature<C::F>,
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, CylinderFeature<C::F>, CylinderFeature<C::F>> {
         let c = C::F::c;
-        let lines = !(own.cap | other.cap);
+        let lines = !(feature.cap | cylinder.cap);
         let along = lines & lines_along::<C>(&self.pose);
         // a line may be clipped by a cap, but clips only a line beside it
-        let swap = own.cap & !other.cap;
+        let swap = feature.cap & !cylinder.cap;
         FeaturePair {
-            flat: along | (own.flat(normal) | other.flat(normal)),
-            clipped: CylinderFeature::select(swap, &other, &own),
-            clipping: CylinderFeature::select(swap, &own, &other),
+            flat: along | (feature.flat(normal) | cylinder.flat(normal)),
+            clipped: CylinderFeature::select(swap, &cylinder, &feature),
+            clipping: CylinderFeature::select(swap, &feature, &cylinder),
             side: C::F::select(swap, c(-1.0), c(1.0)),
         }
     }

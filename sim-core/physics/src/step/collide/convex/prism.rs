@@ -219,37 +219,37 @@ impl<F: Num> Prism<F> {
     /// The place nearest to a point. From inside, the way out is through the nearest face.
     #[inline(always)]
     pub fn nearest(&self, x: Vec3<F>) -> Nearest<F> {
-        let (beyond, mut found) = (self.beyond(x), Search::new());
-        self.offer_faces(x, beyond, &mut found);
+        let (beyond, mut search) = (self.beyond(x), Search::new());
+        self.offer_faces(x, beyond, &mut search);
         let [pq, qk, kp] = self.top_edges();
-        found.offer_edge(pq, x);
-        found.offer_edge(qk, x);
-        found.offer_edge(kp, x);
-        found.nearest(self.up).or(self.way_out(x, beyond))
+        search.offer_edge(pq, x);
+        search.offer_edge(qk, x);
+        search.offer_edge(kp, x);
+        search.nearest(self.up).or(self.way_out(x, beyond))
     }
 
     /// The place nearest to a segment from `-half` to `half` that does not pass through the prism. Of an end inside, its way out.
     #[inline(always)]
     pub fn nearest_to_segment(&self, half: Vec3<F>) -> Nearest<F> {
-        let mut found = Search::new();
+        let mut search = Search::new();
         let square = half.dot(half).max(F::c(TINY));
         let inverse = F::c(1.0).div(square);
         let [pq, qk, kp] = self.top_edges();
-        found.offer_segment(pq, half, square, inverse);
-        found.offer_segment(qk, half, square, inverse);
-        found.offer_segment(kp, half, square, inverse);
-        self.offer_edges_below(half, square, inverse, &mut found);
+        search.offer_segment(pq, half, square, inverse);
+        search.offer_segment(qk, half, square, inverse);
+        search.offer_segment(kp, half, square, inverse);
+        self.offer_edges_below(half, square, inverse, &mut search);
         let (from, to) = (self.beyond(half), self.beyond(-half));
-        self.offer_faces(half, from, &mut found);
-        self.offer_faces(-half, to, &mut found);
-        let near = found.nearest(self.up);
+        self.offer_faces(half, from, &mut search);
+        self.offer_faces(-half, to, &mut search);
+        let near = search.nearest(self.up);
         near.or(self.way_out(half, from))
             .or(self.way_out(-half, to))
     }
 
     /// The vertical edges below the corners of the top, for a segment with this squared half length, and 1 over it.
     #[inline(always)]
-    fn offer_edges_below(&self, half: Vec3<F>, square: F, inverse: F, found: &mut Search<F>) {
+    fn offer_edges_below(&self, half: Vec3<F>, square: F, inverse: F, search: &mut Search<F>) {
         let one = F::c(1.0);
         let flat = half[0].fma(half[0], half[1] * half[1]);
         // of a vertical segment any place will do
@@ -260,31 +260,31 @@ impl<F: Num> Prism<F> {
             let s = (along * unit).max(-one).min(one);
             let height = (half[2] * s).max(self.bottom).min(z);
             let s = half[2].fma(height, along) * inverse;
-            found.offer(Vec3([x, y, height]), half * s.max(-one).min(one));
+            search.offer(Vec3([x, y, height]), half * s.max(-one).min(one));
         }
     }
 
     /// The top, the sides with their edges, and the bottom, for a point this far beyond each face.
     #[inline(always)]
-    fn offer_faces(&self, x: Vec3<F>, beyond: [F; 5], found: &mut Search<F>) {
+    fn offer_faces(&self, x: Vec3<F>, beyond: [F; 5], search: &mut Search<F>) {
         let c = F::c;
         let zero = c(0.0);
         let above = self.up.scale_add(-beyond[0], x);
         let foot = self.beyond(above);
         let square = beyond[0] * beyond[0];
         let on_top = !zero.lt(foot[1].max(foot[2]).max(foot[3])) & !beyond[0].lt(zero);
-        let on_top = on_top & square.lt(found.square);
-        found.place = select(on_top, above, found.place);
-        found.square = F::select(on_top, square, found.square);
-        found.on_top = found.on_top | on_top;
+        let on_top = on_top & square.lt(search.square);
+        search.place = select(on_top, above, search.place);
+        search.square = F::select(on_top, square, search.square);
+        search.on_top = search.on_top | on_top;
         // the side below each edge, at the point's height
         let ([pq, qk, kp], [u, v, w]) = (self.top_edges(), self.inverse);
-        found.offer_side(pq, u, x, self.bottom);
-        found.offer_side(qk, v, x, self.bottom);
-        found.offer_side(kp, w, x, self.bottom);
+        search.offer_side(pq, u, x, self.bottom);
+        search.offer_side(qk, v, x, self.bottom);
+        search.offer_side(kp, w, x, self.bottom);
         let below = !zero.lt(beyond[1].max(beyond[2]).max(beyond[3])) & zero.lt(beyond[4]);
         let place = Vec3([x[0], x[1], F::select(below, self.bottom, c(1e16))]);
-        found.offer(place, x);
+        search.offer(place, x);
     }
 
     /// The way out through the nearest face, for a point inside; far away for one outside.

@@ -94,7 +94,7 @@ impl<F: Num> Search<F> {
     #[inline(always)]
     fn offer_common<R: Reach<F>>(
         &mut self,
-        of: &Common<F>,
+        common: &Common<F>,
         up: Vec3<F>,
         other: &R,
         limits: Limits<F>,
@@ -102,9 +102,9 @@ impl<F: Num> Search<F> {
     ) {
         // of parallel ones the normal is that of a face
         let far = F::c(1e18);
-        let low = F::select(of.parallel, -far, of.span[0]);
-        let high = F::select(of.parallel, far, of.span[1]);
-        let (n, half) = (of.normal, other.reach(of.normal));
+        let low = F::select(common.parallel, -far, common.span[0]);
+        let high = F::select(common.parallel, far, common.span[1]);
+        let (n, half) = (common.normal, other.reach(common.normal));
         self.offer(n, [low, high], half, n.dot(up), limits, code);
     }
 
@@ -258,27 +258,27 @@ impl<F: Num> Prism<F> {
         with_edges: bool,
     ) -> F {
         let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
-        let own = OwnPrism::new(self, axes);
+        let local = OwnPrism::new(self, axes);
         let mut gap = (x - field.half[0]).max(y - field.half[1]);
         gap = gap
             .max(across - field.across)
             .max(bottom - field.half[2])
-            .max(top - other.reach(own.up) - radius);
+            .max(top - other.reach(local.up) - radius);
         for &j in R::FACES {
             let mut unit = [F::c(0.0); 3];
             unit[j] = F::c(1.0);
-            let (half, [low, high]) = (other.reach(Vec3(unit)) + radius, own.span(j));
+            let (half, [low, high]) = (other.reach(Vec3(unit)) + radius, local.span(j));
             gap = gap.max(low - half).max(-high - half);
         }
         if with_edges {
             if R::EDGES.contains(&0) {
-                gap = own.gap_across::<0, R>(other, radius, gap);
+                gap = local.gap_across::<0, R>(other, radius, gap);
             }
             if R::EDGES.contains(&1) {
-                gap = own.gap_across::<1, R>(other, radius, gap);
+                gap = local.gap_across::<1, R>(other, radius, gap);
             }
             if R::EDGES.contains(&2) {
-                gap = own.gap_across::<2, R>(other, radius, gap);
+                gap = local.gap_across::<2, R>(other, radius, gap);
             }
         }
         gap
@@ -297,39 +297,39 @@ impl<F: Num> Prism<F> {
         facing: f64,
     ) -> PrismAxis<F> {
         let c = F::c;
-        let own = OwnPrism::new(self, axes);
+        let local = OwnPrism::new(self, axes);
         let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
-        let distance = top - other.reach(own.up);
+        let distance = top - other.reach(local.up);
         let mut best = Search {
-            normal: -own.up,
+            normal: -local.up,
             distance,
             gap: distance,
             code: c(0.0),
         };
         let limits = Limits { tolerance, facing };
-        let [u, v, w] = own.field;
+        let [u, v, w] = local.field;
         let (side, [a, b]) = (self.side, self.across);
         let m = u * -side;
-        best.offer_face(m, x - other.reach(m), m.dot(own.up), limits);
+        best.offer_face(m, x - other.reach(m), m.dot(local.up), limits);
         let m = v * side;
-        best.offer_face(m, y - other.reach(m), m.dot(own.up), limits);
+        best.offer_face(m, y - other.reach(m), m.dot(local.up), limits);
         let m = u.scale_add(a, v * b);
-        best.offer_face(m, across - other.reach(m), m.dot(own.up), limits);
-        best.offer_face(-w, bottom - other.reach(w), -w.dot(own.up), limits);
+        best.offer_face(m, across - other.reach(m), m.dot(local.up), limits);
+        best.offer_face(-w, bottom - other.reach(w), -w.dot(local.up), limits);
         for &j in R::FACES {
             let mut unit = [c(0.0); 3];
             unit[j] = c(1.0);
-            let (unit, rise) = (Vec3(unit), own.up[j]);
-            best.offer(unit, own.span(j), other.reach(unit), rise, limits, 2.0);
+            let (unit, rise) = (Vec3(unit), local.up[j]);
+            best.offer(unit, local.span(j), other.reach(unit), rise, limits, 2.0);
         }
         if R::EDGES.contains(&0) {
-            own.offer_across::<0, R>(other, limits, &mut best);
+            local.offer_across::<0, R>(other, limits, &mut best);
         }
         if R::EDGES.contains(&1) {
-            own.offer_across::<1, R>(other, limits, &mut best);
+            local.offer_across::<1, R>(other, limits, &mut best);
         }
         if R::EDGES.contains(&2) {
-            own.offer_across::<2, R>(other, limits, &mut best);
+            local.offer_across::<2, R>(other, limits, &mut best);
         }
         self.features(axes, &best)
     }

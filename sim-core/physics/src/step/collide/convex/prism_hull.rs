@@ -54,14 +54,15 @@ impl FieldNarrow for OfHull {
         let limit = pair.margin;
         when!(cx, outer.gap.lt(limit), {
             let first = PosedHull {
-                own: hull,
+                hull,
                 axes: *axes,
                 center: Vec3::zero(),
             };
             let (start, gap) = best_face(cx, prism, &first);
             when!(cx, gap.lt(limit), {
                 let all = size + prism.radius();
-                let found = closest_points(cx, &first, prism, start.normal, all, limit, &NoRestart);
+                let closest =
+                    closest_points(cx, &first, prism, start.normal, all, limit, &NoRestart);
                 let corner = first.farthest(cx, start.normal);
                 let deep = Separation {
                     normal: start.normal,
@@ -70,7 +71,7 @@ impl FieldNarrow for OfHull {
                         .normal
                         .scale_add(start.distance * C::F::c(0.5), corner),
                 };
-                let near = facing_or(prism, found, deep);
+                let near = facing_or(prism, closest, deep);
                 when!(cx, near.distance.lt(limit), {
                     let face = hull_face(cx, &hull, axes, near.normal);
                     let features = FeaturePair {
@@ -127,7 +128,7 @@ impl<C: Cx> FaceSearch<C> {
 fn best_face<C: Cx>(
     cx: &mut C,
     prism: &Prism<C::F>,
-    hull: &PosedHull<'_, C>,
+    posed: &PosedHull<'_, C>,
 ) -> (SeparatingAxis<C::F>, C::F) {
     let c = C::F::c;
     let mut search = FaceSearch {
@@ -136,14 +137,14 @@ fn best_face<C: Cx>(
         gap: cx.var(c(-1e18)),
     };
     for face in prism.normals() {
-        let (_, way) = minkowski_support(cx, hull, prism, -face);
+        let (_, way) = minkowski_support(cx, posed, prism, -face);
         search.offer(cx, prism, -face, -way.dot(face));
     }
-    let faces = hull.own.tables.faces;
-    let (first, end) = hull.own.span(cx, Part::Faces);
+    let faces = posed.hull.tables.faces;
+    let (first, end) = posed.hull.span(cx, Part::Faces);
     span!(cx, face in first, end, {
         let [mx, my, mz, offset] = cx.constants(faces, face, 0);
-        let m = hull.axes * Vec3([mx, my, mz]);
+        let m = posed.axes * Vec3([mx, my, mz]);
         let [low, _] = prism.span(m);
         search.offer(cx, prism, m, low - offset);
     });

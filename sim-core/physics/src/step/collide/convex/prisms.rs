@@ -261,10 +261,10 @@ impl FieldNarrow for OfBox {
             let mut distance = cx.var(deep.distance);
             when!(cx, c(0.0).lt(best.gap), {
                 let start = best.axis.normal;
-                let found = closest_points(cx, &core, prism, start, size, limit, &NoRestart);
-                set3(cx, &mut normal, found.normal);
-                set3(cx, &mut point, found.point);
-                cx.set(&mut distance, found.distance);
+                let closest = closest_points(cx, &core, prism, start, size, limit, &NoRestart);
+                set3(cx, &mut normal, closest.normal);
+                set3(cx, &mut point, closest.point);
+                cx.set(&mut distance, closest.distance);
             });
             let near = Separation {
                 normal: get3(cx, &normal),
@@ -327,9 +327,9 @@ impl FieldNarrow for OfCylinder {
             };
             let core = PosedShape::<C>::core(&shape);
             let start = best.axis.normal;
-            let found = closest_points(cx, &core, prism, start, size, limit, &restart);
+            let closest = closest_points(cx, &core, prism, start, size, limit, &restart);
             let deep = penetration(cx, prism, &core, &best);
-            let near = facing_or(prism, found, deep);
+            let near = facing_or(prism, closest, deep);
             add_touching(cx, pair, &shape, prism, &near, out);
         });
     }
@@ -339,15 +339,15 @@ impl FieldNarrow for OfCylinder {
 #[inline(always)]
 pub(in crate::step::collide) fn facing_or<F: Num>(
     prism: &Prism<F>,
-    found: Separation<F>,
+    closest: Separation<F>,
     deep: Separation<F>,
 ) -> Separation<F> {
     let c = F::c;
-    let is_out = c(FACING).lt(-prism.up.dot(found.normal)) | c(0.0).lt(found.distance);
+    let is_out = c(FACING).lt(-prism.up.dot(closest.normal)) | c(0.0).lt(closest.distance);
     Separation {
-        normal: select(is_out, found.normal, deep.normal),
-        distance: F::select(is_out, found.distance, deep.distance),
-        point: select(is_out, found.point, deep.point),
+        normal: select(is_out, closest.normal, deep.normal),
+        distance: F::select(is_out, closest.distance, deep.distance),
+        point: select(is_out, closest.point, deep.point),
     }
 }
 

@@ -71,7 +71,7 @@ impl<F: Num, A: Reach<F> + Copy, B: Reach<F> + Copy> StartAxes<'_, F, A, B> {
 
     /// An axis of the first shape.
     #[inline(always)]
-    pub fn own(&self, j: usize) -> BestStart<F> {
+    pub fn first_axis(&self, j: usize) -> BestStart<F> {
         self.along(self.pose.axes[j])
     }
 

@@ -87,11 +87,11 @@ impl<C: Cx> Support<C> for LocalCylinder<C::F> {
 impl<C: Cx> Support<C> for CylinderCore<C::F> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
-        let own = LocalCylinder {
+        let local = LocalCylinder {
             radius: self.radius,
             half_height: self.half_height,
         };
-        let point = own.farthest(cx, self.axes.transpose_mul(d));
+        let point = local.farthest(cx, self.axes.transpose_mul(d));
         self.axes.mul_add(point, self.center)
     }
 }

@@ -255,7 +255,7 @@ pub(in crate::step::collide) fn farthest_candidate<C: Cx>(
     least: C::F,
 ) -> (Vec3<C::F>, C::F) {
     let c = C::F::c;
-    let score = ReductionScore::of(count, chosen);
+    let score = ReductionScore::from_chosen(count, chosen);
     let mut best = cx.var(score.threshold(least));
     // where none is found the first point stands in, and nothing is found after it
     let mut place = var3(cx, chosen[0]);

@@ -49,7 +49,7 @@ struct Chosen<C: Cx> {
     /// The deepest point, then the three that span most.
     spots: [[C::V; 3]; 4],
     /// 1 where the second, third and fourth exist.
-    found: [C::V; 3],
+    exists: [C::V; 3],
     /// The clipped feature as slopes and base: its height at a point.
     surface: [C::V; 3],
     /// 1 where the first point is the pair's closest one.
@@ -68,7 +68,7 @@ impl<C: Cx> Chosen<C> {
                 var3(cx, Vec3([zero; 3])),
                 var3(cx, Vec3([zero; 3])),
             ],
-            found: [cx.var(zero), cx.var(zero), cx.var(zero)],
+            exists: [cx.var(zero), cx.var(zero), cx.var(zero)],
             surface: var3(cx, Vec3([zero; 3])),
             is_closest: cx.var(C::F::c(1.0)),
         }
@@ -186,7 +186,7 @@ fn reduce<C: Cx>(
         let least = C::F::c(SPREAD) * clip.size;
         let (x, is) = farthest_candidate(cx, clip.tables, most, count, spots, least);
         set3(cx, &mut chosen.spots[count + 1], x);
-        cx.set(&mut chosen.found[count], is);
+        cx.set(&mut chosen.exists[count], is);
     }
 }
 
@@ -218,7 +218,7 @@ fn add_chosen<C: Cx>(
         let point = frame.axes.mul_add(point, frame.center);
         let is = match k {
             0 => distance.lt(pair.margin),
-            _ => c(0.5).lt(cx.get(&chosen.found[k - 1])),
+            _ => c(0.5).lt(cx.get(&chosen.exists[k - 1])),
         };
         out.add(cx, is, point, distance, normal);
     }

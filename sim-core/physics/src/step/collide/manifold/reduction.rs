@@ -58,7 +58,7 @@ pub(in crate::step::collide) enum ReductionScore<F> {
 impl<F: Num> ReductionScore<F> {
     /// With `count` + 1 of the points chosen.
     #[inline(always)]
-    pub fn of(count: usize, chosen: [Vec3<F>; 3]) -> ReductionScore<F> {
+    pub fn from_chosen(count: usize, chosen: [Vec3<F>; 3]) -> ReductionScore<F> {
         let [p, q, r] = chosen;
         match count {
             0 => ReductionScore::Point(p),

@@ -82,16 +82,20 @@ pub fn min_component<F: Num>(x: Vec3<F>) -> (F, F) {
 
 /// The column with this index.
 #[inline(always)]
-pub fn column_at<F: Num>(index: F, of: Mat3<F>) -> Vec3<F> {
+pub fn column_at<F: Num>(index: F, columns: Mat3<F>) -> Vec3<F> {
     let (first, second) = (index.lt(F::c(0.5)), index.lt(F::c(1.5)));
-    select(first, of[0], select(second, of[1], of[2]))
+    select(first, columns[0], select(second, columns[1], columns[2]))
 }
 
 /// The component with this index.
 #[inline(always)]
-pub fn component_at<F: Num>(index: F, of: Vec3<F>) -> F {
+pub fn component_at<F: Num>(index: F, components: Vec3<F>) -> F {
     let (first, second) = (index.lt(F::c(0.5)), index.lt(F::c(1.5)));
-    F::select(first, of[0], F::select(second, of[1], of[2]))
+    F::select(
+        first,
+        components[0],
+        F::select(second, components[1], components[2]),
+    )
 }
 
 /// `x`, or 0 where `k` is the index.
@@ -109,20 +113,24 @@ pub fn only_at<F: Num>(index: F, k: usize, x: F) -> F {
 
 /// Columns in cyclic order, that of the index first.
 #[inline(always)]
-pub fn cycle_columns<F: Num>(index: F, of: Mat3<F>) -> Mat3<F> {
+pub fn cycle_columns<F: Num>(index: F, columns: Mat3<F>) -> Mat3<F> {
     Mat3([
-        column_at(index, of),
-        column_at(index, Mat3([of[1], of[2], of[0]])),
-        column_at(index, Mat3([of[2], of[0], of[1]])),
+        column_at(index, columns),
+        column_at(index, Mat3([columns[1], columns[2], columns[0]])),
+        column_at(index, Mat3([columns[2], columns[0], columns[1]])),
     ])
 }
 
 /// Components in cyclic order, that of the index first.
 #[inline(always)]
-pub fn cycle_components<F: Num>(index: F, of: Vec3<F>) -> Vec3<F> {
+pub fn cycle_components<F: Num>(index: F, components: Vec3<F>) -> Vec3<F> {
     column_at(
         index,
-        Mat3([of, Vec3([of[1], of[2], of[0]]), Vec3([of[2], of[0], of[1]])]),
+        Mat3([
+            components,
+            Vec3([components[1], components[2], components[0]]),
+            Vec3([components[2], components[0], components[1]]),
+        ]),
     )
 }
 

@@ -60,21 +60,21 @@ pub fn sphere_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
 /// Capsule and cylinder: two points where they lie along each other, or one.
 #[inline(always)]
 pub fn capsule_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let shapes = AgainstCylinder::new(pair, PosedCapsule::of(pair));
+    let shapes = AgainstCylinder::new(pair, PosedCapsule::from_pair(pair));
     add_convex_contacts(cx, pair, &shapes, out);
 }
 
 /// Box and cylinder: four points where a cap lies on a face, two where the side does, or one.
 #[inline(always)]
 pub fn box_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let shapes = AgainstCylinder::new(pair, PosedBox::of(pair));
+    let shapes = AgainstCylinder::new(pair, PosedBox::from_pair(pair));
     add_convex_contacts(cx, pair, &shapes, out);
 }
 
 /// Two cylinders: four points where their caps meet, two where one lies along the other or on its cap, or one.
 #[inline(always)]
 pub fn cylinder_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
-    let shapes = AgainstCylinder::new(pair, PosedCylinder::of(pair));
+    let shapes = AgainstCylinder::new(pair, PosedCylinder::from_pair(pair));
     add_convex_contacts(cx, pair, &shapes, out);
 }
 
