@@ -52,6 +52,7 @@ impl<'a, F: Num> HullFace<'a, F> {
         d: Vec3<F>,
     ) -> HullFace<'a, F> {
         let faces = hull.tables.faces;
+        // the direction in the hull's own frame
         let d = match &pose {
             Some(pose) => pose.axes.transpose_mul(d),
             None => d,
@@ -60,14 +61,17 @@ impl<'a, F: Num> HullFace<'a, F> {
         // below any cosine
         let mut best = cx.var(F::c(-2.0));
         let mut at = cx.var(F::c(0.0));
+        // the face whose normal m has the largest m · d; of equal ones the first
         span!(cx, face in start, end, {
             let m = Vec3(cx.constants(faces, face, 0));
             let facing = m.dot(d);
             let old = cx.get(&best);
             let (number, kept) = (cx.number(face), cx.get(&at));
+            // unmasked: all worlds of the block search the same faces, and inactive ones are not read
             cx.put(&mut at, F::select(old.lt(facing), number, kept));
             cx.put(&mut best, old.max(facing));
         });
+        // its normal in the frame of the pair, and its rows in the table of corners
         let at = cx.get(&at);
         let m = pick3(cx, faces, at, 0);
         HullFace {
@@ -121,9 +125,11 @@ impl<F: Num> BoxFace<F> {
     #[inline(always)]
     pub fn find(pose: &ShapePose<F>, half: Vec3<F>, d: Vec3<F>) -> BoxFace<F> {
         let (axes, center) = (&pose.axes, pose.center);
+        // d in the axes of the box: the largest component names the face, its sign the side
         let facing = axes.transpose_mul(d);
         let mut best = BoxFace::face(axes, half, center, 0, facing[0]);
         let mut most = facing[0].abs();
+        // selected component by component, since the axis differs per world; of equal ones the first
         for j in 1..3 {
             let other = BoxFace::face(axes, half, center, j, facing[j]);
             let is = most.lt(facing[j].abs());
@@ -142,6 +148,7 @@ impl<F: Num> BoxFace<F> {
     #[inline(always)]
     fn face(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, j: usize, facing: F) -> BoxFace<F> {
         let (k, l) = ((j + 1) % 3, (j + 2) % 3);
+        // v takes the sign of the normal, so that u × v is outward and corners are counter-clockwise
         let outward = axes[j] * with_sign(F::c(1.0), facing);
         BoxFace {
             outward,
@@ -188,6 +195,7 @@ impl<F: Num> SegmentLine<F> {
     /// From `center - half` to `center + half`, seen along `normal`, which points outward.
     #[inline(always)]
     pub fn new(center: Vec3<F>, half: Vec3<F>, normal: Vec3<F>) -> SegmentLine<F> {
+        // n - h (h · n)/(h · h), finite for a segment without length
         let square = half.dot(half).max(F::c(1e-24));
         let slope = half.dot(normal).div(square);
         // the part of the normal across the line
@@ -210,6 +218,7 @@ impl<C: Cx> Feature<C> for SegmentLine<C::F> {
     }
     #[inline(always)]
     fn corner(&self, cx: &mut C, i: C::I) -> Vec3<C::F> {
+        // corner 1 is the end at +half, 0 and the one past the last that at -half
         let c = C::F::c;
         let place = cx.number(i);
         let second = c(0.5).lt(place) & place.lt(c(1.5));
@@ -236,6 +245,7 @@ impl<F: Num> CylinderFeature<F> {
     #[inline(always)]
     pub fn find(pose: &ShapePose<F>, radius: F, half_height: F, d: Vec3<F>) -> CylinderFeature<F> {
         let (axes, center) = (&pose.axes, pose.center);
+        // d in the cylinder's axes
         let local = axes.transpose_mul(d);
         // an upright cylinder keeps its rim points: rounding must not choose their direction
         let width = local[0].fma(local[0], local[1] * local[1]).sqrt();
@@ -245,10 +255,12 @@ impl<F: Num> CylinderFeature<F> {
             F::select(upright, F::c(1.0), local[0] * unit),
             F::select(upright, F::c(0.0), local[1] * unit),
         );
+        // outward normals of the side and of the cap that d faces
         let rim = axes[0].scale_add(x, axes[1] * y);
         let cap = F::c(0.7).lt(local[2].abs());
         let end = axes[2] * with_sign(F::c(1.0), local[2]);
         let half = axes[2] * half_height;
+        // u × v is along the cap's normal, so that its corners are counter-clockwise; a line has u alone
         CylinderFeature {
             outward: select(cap, end, rim),
             center: select(
@@ -276,6 +288,7 @@ impl<F: Num> CylinderFeature<F> {
         a: &CylinderFeature<F>,
         b: &CylinderFeature<F>,
     ) -> CylinderFeature<F> {
+        // `F::select` takes scalars; a mask is chosen by logic
         let cap = (mask & a.cap) | (!mask & b.cap);
         CylinderFeature {
             outward: select(mask, a.outward, b.outward),

@@ -63,12 +63,14 @@ impl<C: Cx> Progress<C> {
     /// Takes an axis with its distance and middle if it is the best, and goes on from it.
     #[inline(always)]
     fn offer(&mut self, cx: &mut C, distance: C::F, axis: Vec3<C::F>, middle: Vec3<C::F>) {
+        // equal counts as better: `best` may be this axis' distance already, without its normal and point
         let better = !distance.lt(cx.get(&self.best));
         let (kept_normal, kept_point) = (get3(cx, &self.normal), get3(cx, &self.point));
         let old = cx.get(&self.best);
         cx.set(&mut self.best, C::F::select(better, distance, old));
         set3(cx, &mut self.normal, select(better, axis, kept_normal));
         set3(cx, &mut self.point, select(better, middle, kept_point));
+        // the next stand-off is along this axis in any case
         set3(cx, &mut self.axis, axis);
     }
 
@@ -84,25 +86,30 @@ impl<C: Cx> Progress<C> {
     ) -> MaskOf<C> {
         let c = C::F::c;
         let (zero, one) = (c(0.0), c(1.0));
+        // deep enough for a restart, with a try left
         let tries = cx.get(&self.restarts);
         let mut again = cx.var(zero);
         let deep = distance.lt(-restart.depth()) & tries.lt(c(R::TRIES as f64 - 0.5));
         when!(cx, settled & deep, {
+            // what another axis must exceed: the best distance and the least gain that counts
             let known = SeparatingAxis {
                 normal: get3(cx, &self.normal),
                 distance: cx.get(&self.best) + settled_at,
             };
             let from = get3(cx, &self.tried);
             let other = restart.axis(cx, known, from);
+            // the next stand-off is along the other axis
             set3(cx, &mut self.axis, other.normal);
             set3(cx, &mut self.tried, other.normal);
             cx.set(&mut self.restarts, tries + one);
+            // any axis will do if it need not be better; a distance of -1e18 means that there was none
             let least = if R::BETTER { known.distance } else { c(-1e17) };
             cx.set(
                 &mut again,
                 C::F::select(least.lt(other.distance), one, zero),
             );
         });
+        // settled worlds that do not start again
         settled & cx.get(&again).lt(c(0.5))
     }
 }
@@ -121,15 +128,18 @@ pub(in crate::step::collide) fn closest_points<C: Cx, R: Restart<C>>(
     restart: &R,
 ) -> Separation<C::F> {
     let c = C::F::c;
+    // both lengths scale with the shapes
     let gap = size * c(gap::<RealOf<C>>());
     let settled_at = size * c(settled_gain::<RealOf<C>>());
     let mut progress = Progress::new(cx, start);
     times!(cx, stand_offs::<RealOf<C>>(), {
+        // distance along the axis m: min m · (B - A), a lower bound of the true one
         let m = get3(cx, &progress.axis);
         let (on_a, w) = minkowski_support(cx, a, b, m);
         let before = m.dot(w);
         let known = cx.get(&progress.best);
         cx.set(&mut progress.best, known.max(before));
+        // past the limit the axis itself proves that there is no contact
         break_if!(cx, limit.lt(before));
         // GJK with B moved away until the gap is open
         let shift = (gap - before).max(c(0.0));
@@ -141,7 +151,9 @@ pub(in crate::step::collide) fn closest_points<C: Cx, R: Restart<C>>(
             w: w + away,
         };
         let apart: Distance<C::F> = gjk_distance(cx, a, b, &from, size, limit + shift);
+        // along the new axis n with B moved back: d - shift (n · m)
         let after = apart.distance - shift * apart.normal.dot(m);
+        // without a gain that counts m stays the best axis
         let gained = (before + settled_at).lt(after);
         let (x, n) = (
             C::F::select(gained, after, before),
@@ -150,7 +162,9 @@ pub(in crate::step::collide) fn closest_points<C: Cx, R: Restart<C>>(
         // half-way between the closest points, B moved back
         let middle = (apart.way - away).scale_add(c(0.5), apart.on_a);
         progress.offer(cx, x, n, middle);
+        // settled: no gain, shapes apart by the gap, where GJK is exact, or a distance past the limit
         let settled = !gained | (gap.lt(before) | limit.lt(x));
+        // a settled world goes on only from a restart
         if R::TRIES > 0 {
             let settled = progress.restart(cx, restart, settled, x, settled_at);
             break_if!(cx, settled);

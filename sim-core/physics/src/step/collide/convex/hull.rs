@@ -24,6 +24,7 @@ macro_rules! each_far_row {
             let (first, end) = $hull.clusters($cx);
             span!($cx, cluster in first, end, {
                 let (center, radius) = $hull.cluster($cx, cluster);
+                // bound of the cluster's vertices along d: d · center + radius |d|
                 let bound = radius.fma(length, center.dot($d));
                 when!($cx, !bound.lt($cx.get(&$best)), {
                     let (first, end) = $hull.cluster_rows($cx, cluster);
@@ -69,6 +70,7 @@ impl<C: Cx> Hull<'_, C> {
     /// First and end of its rows of a kind.
     #[inline(always)]
     pub fn span(&self, cx: &mut C, part: Part) -> (C::I, C::I) {
+        // first and end are columns 2 k and 2 k + 1 of the hull's row of spans
         let part = part as usize;
         let rows = [self.tables.vertices, self.tables.faces, self.tables.edges][part].rows;
         let first = cx.index(self.tables.spans, self.row, 2 * part, rows + 1);
@@ -114,6 +116,7 @@ impl<C: Cx> Hull<'_, C> {
     /// How far it reaches along `d`: the largest d · vertex.
     #[inline(always)]
     pub fn reach(&self, cx: &mut C, d: Vec3<C::F>) -> C::F {
+        // the largest d · x, four vertices a row
         let mut best = cx.var(C::F::c(-1e18));
         each_far_row!(cx, self, d, best, row, {
             let mut reach = cx.get(&best);
@@ -133,6 +136,7 @@ impl<C: Cx> Support<C> for Hull<'_, C> {
         // row of the vertex, and its quarter of the row
         let mut at = cx.var(C::F::c(0.0));
         each_far_row!(cx, self, d, best, row, {
+            // a place is row + k/4 for vertex k of a row; of equally far vertices the first visited stays
             let number = cx.number(row);
             let (mut reach, mut place) = (cx.get(&best), cx.get(&at));
             for (k, point) in vertex_row(cx, self.tables, row).into_iter().enumerate() {
@@ -158,6 +162,7 @@ impl<C: Cx> Support<C> for Hull<'_, C> {
 impl<C: Cx> Support<C> for PosedHull<'_, C> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        // the direction in the hull's axes, and the point back from them
         let point = self.hull.farthest(cx, self.axes.transpose_mul(d));
         self.axes.mul_add(point, self.center)
     }

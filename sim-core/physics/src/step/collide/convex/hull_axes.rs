@@ -135,14 +135,18 @@ pub(in crate::step::collide) fn bounding_box_axis<F: Num, R: Reach<F>>(
     other: &R,
 ) -> SeparatingAxis<F> {
     let (axes, center) = (&pose.axes, pose.center);
+    // the hull as its bounding box
     let box_reach = BoxReach(half);
+    // line of centres, from the other to the hull: n = -center/|center|, or z where centres coincide
     let length = center.dot(center).sqrt();
     let apart = F::c(1e-12).lt(length);
     let ray = center * F::c(-1.0).div(length.max(F::c(1e-12)));
     let up = [F::c(0.0), F::c(0.0), F::c(1.0)];
     let normal = select(apart, ray, Vec3(up));
+    // along n the centres are |center| apart, less the reach of either
     let distance = length - box_reach.reach(normal) - other.reach(axes.transpose_mul(normal));
     let mut best = SeparatingAxis { normal, distance };
+    // axes of the bounding box, against the side of the other's centre; row i is axis i in the other's axes
     for i in 0..3 {
         let row = [axes[0][i], axes[1][i], axes[2][i]];
         let mut normal = [F::c(0.0); 3];
@@ -157,6 +161,7 @@ pub(in crate::step::collide) fn bounding_box_axis<F: Num, R: Reach<F>>(
             F::c(0.0),
         );
     }
+    // normals of the other's faces, likewise
     for &j in R::FACES {
         let mut unit = [F::c(0.0); 3];
         unit[j] = F::c(1.0);
@@ -213,6 +218,7 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
     /// The best separating axis.
     #[inline(always)]
     pub fn best(&self, cx: &mut C) -> HullAxis<C::F> {
+        // each part is skipped in worlds where an axis so far proves the limit
         let mut search = self.hull_faces(cx);
         if !R::FACES.is_empty() {
             let near = cx.get(&search.distance).lt(self.limit);
@@ -226,6 +232,7 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
                 self.edge_pairs(cx, &mut search);
             });
         }
+        // the search has normals from the hull to the other: the pair's point the other way
         HullAxis {
             axis: SeparatingAxis {
                 normal: -get3(cx, &search.normal),
@@ -258,10 +265,12 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
         span!(cx, face in first, end, {
             let [mx, my, mz, offset] = cx.constants(tables.faces, face, 0);
             let m = Vec3([mx, my, mz]);
+            // distance along an outward normal m: m · center - offset - reach of the other
             let x = m.dot(self.center) - offset - self.reach(m);
             let old = cx.get(&search.distance);
             let farther = old.lt(x);
             let kept = get3(cx, &search.normal);
+            // unmasked: in a world that has ended the distance only grows, and stays past the limit
             cx.put(&mut search.distance, C::F::select(farther, x, old));
             put3(cx, &mut search.normal, select(farther, m, kept));
             // any face that proves the limit is enough
@@ -276,11 +285,13 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
         let (c, axes) = (C::F::c, self.axes);
         let (high, low) = self.hull_extents(cx);
         for &j in R::FACES {
+            // along its axis the other covers height ± half, the hull low to high
             let mut unit = [c(0.0); 3];
             unit[j] = c(1.0);
             let (height, half) = (axes[j].dot(self.center), self.other.reach(Vec3(unit)));
             let above = height - half - high[j];
             let below = low[j] - height - half;
+            // the side with the larger distance, as seen from the hull
             let side = with_sign(c(1.0), above - below);
             let x = above.max(below);
             let old = cx.get(&search.distance);
@@ -305,6 +316,7 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
         let mut lowest = var3(cx, Vec3([c(1e18); 3]));
         let (first, end) = self.hull.span(cx, Part::Vertices);
         span!(cx, row in first, end, {
+            // only the axes that are normals of faces are filled
             let (mut high, mut low) = (get3(cx, &highest), get3(cx, &lowest));
             for vertex in vertex_row(cx, tables, row) {
                 for &j in R::FACES {
@@ -324,6 +336,7 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
     fn edge_pairs(&self, cx: &mut C, search: &mut Search<C>) {
         let c = C::F::c;
         let tables = self.hull.tables;
+        // a face stays the best unless two edges exceed it by the tolerance
         let start = cx.get(&search.distance) + self.tolerance;
         let mut best = EdgeSearch {
             distance: cx.var(start),
@@ -340,15 +353,18 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
             let [px, py, pz, ax, ay, az] = cx.constants(tables.edges, edge, 0);
             let (point, along) = (Vec3([px, py, pz]), Vec3([ax, ay, az]));
             let length = cx.constant(tables.edges, edge, 12);
+            // the higher end of the edge along m
             let height = m.dot(point) + (m.dot(along) * length).max(c(0.0));
             let reaches = !height.lt(floor);
             when!(cx, reaches, {
+                // normals of the faces beside the edge, for edges that reach the floor
                 let [n1x, n1y, n1z, n2x, n2y, n2z] = cx.constants(tables.edges, edge, 6);
                 let (n1, n2) = (Vec3([n1x, n1y, n1z]), Vec3([n2x, n2y, n2z]));
                 let hull_edge = HullEdge { point, along, outward: n1 + n2, normals: [n1, n2] };
                 self.edge_with_others(cx, edge, &hull_edge, &mut best, search);
             });
         });
+        // the best axis of two edges replaces that of a face
         let (x, old) = (cx.get(&best.distance), cx.get(&search.distance));
         let farther = (old + self.tolerance).lt(x);
         let (unit, kept) = (get3(cx, &best.normal), get3(cx, &search.normal));
@@ -369,16 +385,19 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
         search: &mut Search<C>,
     ) {
         let c = C::F::c;
+        // from the edge to the other's centre
         let (way, [n1, n2]) = (self.center - hull_edge.point, hull_edge.normals);
         for &j in R::EDGES {
             let q = self.axes[j];
             // the two edges make a face of the Minkowski difference
             let crosses = (n1.dot(q) * n2.dot(q)).lt(c(0.0));
             when!(cx, crosses, {
+                // n = d × q, of unit length, outward of the hull; guarded for parallel edges
                 let axis = hull_edge.along.cross(q);
                 let square = axis.dot(axis);
                 let unit = c(1.0).div(square.max(c(1e-6)).sqrt());
                 let unit = axis * with_sign(unit, axis.dot(hull_edge.outward));
+                // distance along n: n · (center - p) - reach of the other
                 let x = unit.dot(way) - self.reach(unit);
                 let old = cx.get(&best.distance);
                 // of nearly parallel edges the normal is that of a face
@@ -386,6 +405,7 @@ impl<C: Cx, R: Reach<C::F>> HullAxes<'_, '_, C, R> {
                 cx.set(&mut best.distance, C::F::select(farther, x, old));
                 let kept = get3(cx, &best.normal);
                 set3(cx, &mut best.normal, select(farther, unit, kept));
+                // which edges they are, for the point of contact
                 let place = &mut search.place;
                 let (number, at, along) = (cx.number(edge), cx.get(&place[0]), cx.get(&place[1]));
                 cx.set(&mut place[0], C::F::select(farther, number, at));

@@ -57,6 +57,7 @@ impl<C: Cx> Restart<C> for MinkowskiFaces<'_, C> {
 
     #[inline(always)]
     fn axis(&self, cx: &mut C, known: SeparatingAxis<C::F>, _: Vec3<C::F>) -> SeparatingAxis<C::F> {
+        // another axis must be less deep than the known one
         let mut best = BestAxis {
             depth: cx.var(-known.distance),
             axis: var3(cx, known.normal),
@@ -65,6 +66,7 @@ impl<C: Cx> Restart<C> for MinkowskiFaces<'_, C> {
         let on_a = self.first.farthest(cx, known.normal);
         let on_b = self.second.farthest(cx, -known.normal);
         self.faces(cx, on_a, on_b, &mut best);
+        // edges are listed before they are tried: the inner loop then runs for few of them
         let mut promising = cx.list(self.edges.rows);
         self.list_edges(cx, on_b, &best, &mut promising);
         self.edge_pairs(cx, &promising, &mut best);
@@ -83,20 +85,24 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
         let faces = second.tables.faces;
         let (start, end) = first.hull.span(cx, Part::Faces);
         span!(cx, face in start, end, {
+            // normal n of a face of the first, and max n · A
             let n = first.axes * Vec3(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3) + n.dot(first.center);
+            // depth = max n · A - min n · B; with one point of B it is a bound that rejects faces cheaply
             let bound = height - n.dot(on_b);
             when!(cx, bound.lt(cx.get(&best.depth)), {
                 let depth = second.reach(cx, -n) + height;
                 best.offer(cx, depth, n);
             });
         });
+        // faces of the second: axes point from the first to the second, so against their normals
         let (start, end) = second.span(cx, Part::Faces);
         span!(cx, face in start, end, {
             let n = -Vec3(cx.constants(faces, face, 0));
             let height = cx.constant(faces, face, 3);
             let bound = height + n.dot(on_a);
             when!(cx, bound.lt(cx.get(&best.depth)), {
+                // depth = max n · A + offset, A posed at its centre
                 let far = height + n.dot(first.center);
                 let depth = first.hull.reach(cx, first.axes.transpose_mul(n)) + far;
                 best.offer(cx, depth, n);
@@ -117,16 +123,19 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
         let table = second.tables.edges;
         let (start, end) = first.hull.span(cx, Part::Edges);
         span!(cx, edge in start, end, {
+            // normals beside an edge of the first, and its point, in the frame of the second
             let n1 = first.axes * Vec3(cx.constants(table, edge, 6));
             let n2 = first.axes * Vec3(cx.constants(table, edge, 9));
             let point = cx.constants(table, edge, 0);
             let point = first.axes.mul_add(Vec3(point), first.center);
+            // the bound of this file's head with b = `on_b`, then with the farthest point against n₁ + n₂
             let way = point - on_b;
             let bound = way.dot(n1).min(way.dot(n2));
             when!(cx, bound.lt(cx.get(&best.depth)), {
                 let vertex = second.farthest(cx, -(n1 + n2));
                 let way = point - vertex;
                 let bound = way.dot(n1).min(way.dot(n2));
+                // edges past the capacity of the list are left out
                 push!(cx, *promising, bound.lt(cx.get(&best.depth)), row, {
                     let number = cx.number(edge);
                     cx.init(self.edges, row, 0, number);
@@ -143,12 +152,14 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
         let table = second.tables.edges;
         each!(cx, row in *promising, {
             let edge = cx.load(self.edges, row, 0);
+            // the edge in the frame of the second: point, direction, normals beside it
             let point = pick3(cx, table, edge, 0);
             let point = first.axes.mul_add(point, first.center);
             let d = first.axes * pick3(cx, table, edge, 3);
             let n1 = first.axes * pick3(cx, table, edge, 6);
             let n2 = first.axes * pick3(cx, table, edge, 9);
             let outward = n1 + n2;
+            // each edge of the second, with direction q and normals n₃, n₄
             let (start, end) = second.span(cx, Part::Edges);
             span!(cx, other in start, end, {
                 let q = Vec3(cx.constants(table, other, 3));
@@ -157,10 +168,12 @@ impl<C: Cx> MinkowskiFaces<'_, C> {
                 // d is across n₁ and n₂, q across n₃ and n₄: each arc crosses the other's plane, on the same side
                 let crosses = (d.dot(n3) * d.dot(n4)).lt(c(0.0)) & (q.dot(n1) * q.dot(n2)).lt(c(0.0));
                 when!(cx, crosses, {
+                    // n = d × q; `same` where the normals of the second's edge are on its other side
                     let axis = d.cross(q);
                     let square = axis.dot(axis);
                     let side = axis.dot(outward);
                     let same = (side * axis.dot(n3 + n4)).lt(c(0.0));
+                    // outward of the first, of unit length; depth = n · (a - b)
                     let unit = c(1.0).div(square.max(c(1e-8)).sqrt());
                     let axis = axis * with_sign(unit, side);
                     let point_b = cx.constants(table, other, 0);

@@ -100,11 +100,13 @@ impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
     }
     #[inline(always)]
     fn rejecting_axis(&self, cx: &mut C) -> SeparatingAxis<C::F> {
+        // of the hull's bounding box: few axes, no loop over faces
         let half = self.hull.half_extents(cx);
         bounding_box_axis(half, self.first.pose(), &self.first.reach())
     }
     #[inline(always)]
     fn better_axis(&self, cx: &mut C, limit: C::F) -> SeparatingAxis<C::F> {
+        // all axes of the hull and the core; the search ends past the limit of GJK
         let (pose, reach) = (self.first.pose(), self.first.reach());
         let axes = HullAxes {
             hull: &self.hull,
@@ -149,6 +151,7 @@ impl<'a, C: Cx, A: FacetedShape<C>> ConvexPair<C> for AgainstHull<'a, C, A> {
         let face = HullFace::find(cx, &self.hull, None, -normal);
         let face_is_flat = aligned(face.outward, normal);
         FeaturePair {
+            // a shape without flat features leaves it to the hull's face
             flat: match A::lies_flat(&feature, normal) {
                 Some(flat) => flat | face_is_flat,
                 None => face_is_flat,
@@ -210,6 +213,7 @@ impl<'a, C: Cx> ConvexPair<C> for TwoHulls<'a, C> {
     }
     #[inline(always)]
     fn rejecting_axis(&self, _: &mut C) -> SeparatingAxis<C::F> {
+        // both hulls as their bounding boxes, the second's axes those of the frame
         let [half_a, half_b] = self.half_extents;
         bounding_box_axis(half_b, &self.pose, &BoxReach(half_a))
     }

@@ -80,16 +80,20 @@ pub(in crate::step::collide) fn add_convex_contacts<C: Cx, P: ConvexPair<C>>(
     out: &mut Points<C>,
 ) {
     if P::AXES_ARE_EXACT {
+        // separation by all axes; GJK only where the shapes are apart
         let near = shapes.separation(cx, pair.margin);
         add_features(cx, pair, shapes, &near, out);
     } else {
+        // cores are farther apart than surfaces, by the radius
         let limit = match shapes.radius() {
             Some(radius) => pair.margin + radius,
             None => pair.margin,
         };
+        // the distance along any axis is a lower bound: it rejects pairs before GJK
         let start = shapes.rejecting_axis(cx);
         when!(cx, start.distance.lt(limit), {
             if P::HAS_BETTER_AXIS {
+                // a tighter bound, which costs more, for pairs that are left
                 let start = shapes.better_axis(cx, limit);
                 when!(cx, start.distance.lt(limit), {
                     add_from_axis(cx, pair, shapes, start.normal, limit, out);
@@ -111,9 +115,11 @@ fn add_from_axis<C: Cx, P: ConvexPair<C>>(
     limit: C::F,
     out: &mut Points<C>,
 ) {
+    // GJK between the cores
     let (first, second) = shapes.cores();
     let (size, restart) = (shapes.cores_size(cx), shapes.restart());
     let core = closest_points(cx, &first, &second, start, size, limit, &restart);
+    // the first surface is a radius nearer, so the middle moves by half of it along the normal
     let near = match shapes.radius() {
         Some(radius) => Separation {
             distance: core.distance - radius,
@@ -134,6 +140,7 @@ fn add_features<C: Cx, P: ConvexPair<C>>(
     near: &Separation<C::F>,
     out: &mut Points<C>,
 ) {
+    // features are searched only in worlds where the shapes are within the margin
     when!(cx, near.distance.lt(pair.margin), {
         let features = shapes.features(cx, near.normal);
         let size = shapes.smaller_size(cx);
@@ -157,12 +164,15 @@ pub(in crate::step::collide) fn separation_by_axes<C: Cx, A: PosedShape<C>>(
     let radius = radius.unwrap_or(c(0.0));
     let core = shape.core();
     let limit = margin + radius;
+    // farther than any margin until an axis search ends within it
     let mut distance = cx.var(c(1e18));
     let mut normal = var3(cx, Vec3::zero());
     let mut point = var3(cx, Vec3::zero());
+    // a few axes of the bounding box reject before the hull's faces and edges are searched
     let half = hull.half_extents(cx);
     let outer = bounding_box_axis(half, pose, &reach);
     when!(cx, outer.distance.lt(limit), {
+        // all axes of the hull and the core
         let size = shape.size() + hull.radius(cx);
         let axes = HullAxes {
             hull,
@@ -173,8 +183,10 @@ pub(in crate::step::collide) fn separation_by_axes<C: Cx, A: PosedShape<C>>(
             tolerance: axis_tolerance(size),
         };
         let best = axes.best(cx);
+        // apart within the limit, or in penetration; past the limit neither
         let apart = c(0.0).lt(best.axis.distance) & best.axis.distance.lt(limit);
         let inside = !c(0.0).lt(best.axis.distance);
+        // closest points that may be vertices: GJK from the best axis
         when!(cx, apart, {
             let start = best.axis.normal;
             let closest = closest_points(cx, &core, hull, start, size, limit, &NoRestart);
@@ -182,6 +194,7 @@ pub(in crate::step::collide) fn separation_by_axes<C: Cx, A: PosedShape<C>>(
             set3(cx, &mut point, closest.point);
             cx.set(&mut distance, closest.distance);
         });
+        // the best axis is that of least depth
         when!(cx, inside, {
             let x = deepest_point(cx, hull, shape, &core, &best);
             set3(cx, &mut normal, best.axis.normal);
@@ -209,6 +222,7 @@ fn deepest_point<C: Cx, A: PosedShape<C>>(
 ) -> Vec3<C::F> {
     let (c, axes) = (C::F::c, &shape.pose().axes);
     let n = best.axis.normal;
+    // from the surface of the first to the middle: half the (negative) distance along n
     let half = n * (c(0.5) * best.axis.distance);
     // a face of the hull: the other's farthest point
     let corner = core.farthest(cx, n);
@@ -230,8 +244,10 @@ fn deepest_point<C: Cx, A: PosedShape<C>>(
             pick3(cx, edges, best.edge, 0),
             pick3(cx, edges, best.edge, 3),
         );
+        // q, one of the other's axes, which differs per world
         let (first, second) = (best.along.lt(c(0.5)), best.along.lt(c(1.5)));
         let q = select(first, axes[0], select(second, axes[1], axes[2]));
+        // s = ((r - p) · d - (d · q) (r - p) · q)/(1 - (d · q)²); of nearly parallel edges it stays finite
         let mixed = d.dot(q);
         let square = mixed.fnma(mixed, c(1.0)).max(c(1e-7));
         let way = corner - p;

@@ -37,6 +37,7 @@ macro_rules! each_low_row {
             let (first, end) = $hull.clusters($cx);
             span!($cx, cluster in first, end, {
                 let (center, radius) = $hull.cluster($cx, cluster);
+                // least height that a vertex in the cluster's ball can have
                 let lowest = $n.dot(center) - radius;
                 when!($cx, lowest.lt($limit), {
                     let (first, end) = $hull.cluster_rows($cx, cluster);
@@ -50,12 +51,15 @@ macro_rules! each_low_row {
 /// Adds the contacts of a plane with a hull.
 #[inline(always)]
 pub fn plane_hull<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+    // the plane's normal in the frame of the hull, and the height of the hull's centre
     let (hull, b, normal) = (pair.hull_b(), pair.pose_b, pair.axes_a[2]);
     let n = b.axes.transpose_mul(normal);
     let height = normal.dot(b.center);
+    // the bounding box rejects hulls above the margin
     let half = hull.half_extents(cx);
     let reach = BoxReach(half).reach(n);
     when!(cx, (height - reach).lt(pair.margin), {
+        // a model that has fans takes MuJoCo's points
         if hull.tables.fans.rows > 0 {
             add_polygon(cx, pair, &hull, n, height, out);
         } else {
@@ -77,12 +81,14 @@ fn add_widest<C: Cx>(
     out: &mut Points<C>,
 ) {
     let (b, normal) = (pair.pose_b, pair.axes_a[2]);
+    // heights are from the hull's centre, so the limit is the margin less the centre's height
     let u = perpendicular(n);
     let view = View {
         axes: Mat3([u, n.cross(u), n]),
         limit: pair.margin - height,
         size: hull.radius(cx),
     };
+    // far above the limit if no vertex is below it
     let deepest = view.deepest(cx, hull);
     when!(cx, deepest[2].lt(view.limit), {
         let (spots, exists) = view.choose(cx, hull, deepest);
@@ -114,10 +120,12 @@ fn add_polygon<C: Cx>(
 ) {
     let c = C::F::c;
     let (b, normal, tables) = (pair.pose_b, pair.axes_a[2], hull.tables);
+    // heights that differ by less than this are equal
     let same = hull.radius(cx) * c(ROUNDINGS * <C::F as Num>::Real::EPSILON);
     let limit = pair.margin - height;
     let (lowest, deepest) = deepest_vertex(cx, hull, n, limit, same);
     when!(cx, lowest.lt(limit), {
+        // rows of the deepest vertex's fan: one per polygon beside it
         let first = cx.pick(tables.fan_spans, deepest, 0);
         let count = cx.pick(tables.fan_spans, deepest, 1) - c(0.5);
         // MuJoCo begins with a polygon that faces away from the plane
@@ -125,11 +133,13 @@ fn add_polygon<C: Cx>(
         let mut corners = var3(cx, Vec3([deepest; 3]));
         let start = cx.at(0);
         let most = cx.index(tables.fan_sizes, hull.row, 0, tables.fans.rows + 1);
+        // the loop has the length of the largest fan of the hull; a world selects among its own rows alone
         span!(cx, k in start, most, {
             let k = cx.number(k);
             let facing = pick3(cx, tables.fans, first + k, 0).dot(n);
             let places = pick3(cx, tables.fans, first + k, 3);
             let (least, old) = (cx.get(&best), get3(cx, &corners));
+            // the outward normal most against n faces the plane best
             let better = k.lt(count) & facing.lt(least);
             cx.set(&mut best, C::F::select(better, facing, least));
             set3(cx, &mut corners, select(better, places, old));
@@ -142,6 +152,7 @@ fn add_polygon<C: Cx>(
         };
         let origin = Vec3(cx.constants(tables.origins, hull.row, 0));
         let corners = get3(cx, &corners);
+        // the deepest vertex, then the corners that the fan has for its polygon
         for (k, place) in [deepest, corners[0], corners[1], corners[2]]
             .into_iter()
             .enumerate()
@@ -152,6 +163,7 @@ fn add_polygon<C: Cx>(
             if k > 0 {
                 // where a polygon has fewer corners the vertex stands in
                 let is_other = c(0.5).lt((place - deepest).abs());
+                // a corner above the origin of the geom's frame by more than a rounding does not count
                 is = is & is_other & !same.lt(n.dot(x - origin));
             }
             // half-way between vertex and plane
@@ -176,11 +188,13 @@ fn deepest_vertex<C: Cx>(
     let mut rank = cx.var(c(0.0));
     let mut place = cx.var(c(0.0));
     each_low_row!(cx, n, limit, hull, row, {
+        // place of a vertex: four a row
         let number = cx.number(row) * c(4.0);
         let ranks: [C::F; 4] = cx.constants(hull.tables.ranks, row, 0);
         for (k, point) in vertex_row(cx, hull.tables, row).into_iter().enumerate() {
             let at = n.dot(point);
             let (old, first, kept) = (cx.get(&lowest), cx.get(&rank), cx.get(&place));
+            // deeper by more than a rounding, or as deep and earlier in the model's order
             let deeper = (at + same).lt(old);
             let earlier = !(old + same).lt(at) & ranks[k].lt(first);
             // whether others are visited depends on clusters
@@ -223,6 +237,7 @@ impl<F: Num> View<F> {
             var3(cx, Vec3::zero()),
         ];
         let mut exists = [cx.var(one), cx.var(zero), cx.var(zero), cx.var(zero)];
+        // each vertex adds most to those before it
         for count in 0..3 {
             let chosen: [Vec3<F>; 3] = [
                 get3(cx, &spots[0]),
@@ -244,6 +259,7 @@ impl<F: Num> View<F> {
         let mut lowest = var3(cx, Vec3([c(0.0), c(0.0), c(1e18)]));
         each_low_row!(cx, self.axes[2], self.limit, hull, row, {
             for point in vertex_row(cx, hull.tables, row) {
+                // place across the normal and height along it
                 let x = self.axes.transpose_mul(point);
                 let old = get3(cx, &lowest);
                 // whether others are visited depends on clusters
@@ -273,6 +289,7 @@ impl<F: Num> View<F> {
         each_low_row!(cx, self.axes[2], self.limit, hull, row, {
             for point in vertex_row(cx, hull.tables, row) {
                 let x = self.axes.transpose_mul(point);
+                // what the vertex adds, if it is below the limit
                 let here = score.at(x[0], x[1]);
                 let (old, kept, had) = (cx.get(&best), get3(cx, &place), cx.get(&is));
                 let farther = old.lt(here) & x[2].lt(self.limit);

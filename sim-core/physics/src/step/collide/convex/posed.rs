@@ -122,6 +122,7 @@ impl<F: Num> PosedSphere<F> {
     /// The first shape of a pair.
     #[inline(always)]
     pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+        // its centre in the frame of the second shape; its axes do not matter
         let b = pair.pose_b;
         PosedSphere {
             pose: ShapePose {
@@ -137,6 +138,7 @@ impl<F: Num> PosedCapsule<F> {
     /// The first shape of a pair.
     #[inline(always)]
     pub fn from_pair<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> Self {
+        // in the frame of the second shape, with the half axis as a vector
         let (pose, a): (_, &Shape<C>) = (pair.pose_a_in_b(), &pair.a);
         PosedCapsule {
             pose,
@@ -242,6 +244,7 @@ impl<C: Cx> FacetedShape<C> for PosedCapsule<C::F> {
     }
     #[inline(always)]
     fn feature(&self, normal: Vec3<C::F>) -> SegmentLine<C::F> {
+        // the line on its surface: the axis, a radius along the normal
         let center = normal.scale_add(self.radius, self.pose.center);
         SegmentLine::new(center, self.half, normal)
     }
@@ -302,6 +305,7 @@ impl<C: Cx> PosedShape<C> for PosedBox<C::F> {
     }
     #[inline(always)]
     fn core(&self) -> BoxCore<C::F> {
+        // column j is axis j times its half extent
         let (axes, half) = (&self.pose.axes, self.half);
         BoxCore {
             center: self.pose.center,
@@ -445,10 +449,12 @@ impl<C: Cx> FacetedShape<C> for PosedCylinder<C::F> {
         normal: Vec3<C::F>,
     ) -> FeaturePair<C::F, CylinderFeature<C::F>, CylinderFeature<C::F>> {
         let c = C::F::c;
+        // two lines lie along each other where the axes are parallel
         let lines = !(feature.cap | cylinder.cap);
         let along = lines & lines_along::<C>(&self.pose);
         // a line may be clipped by a cap, but clips only a line beside it
         let swap = feature.cap & !cylinder.cap;
+        // `side` is -1 where the cylinder's feature is the one that is clipped
         FeaturePair {
             flat: along | (feature.flat(normal) | cylinder.flat(normal)),
             clipped: CylinderFeature::select(swap, &cylinder, &feature),

@@ -89,6 +89,7 @@ struct Search<F: Num> {
 impl<F: Num> Search<F> {
     #[inline(always)]
     fn new() -> Search<F> {
+        // far < 0 holds nowhere: no place is on the top yet
         let (far, zero) = (F::c(1e36), F::c(0.0));
         Search {
             place: Vec3::zero(),
@@ -108,12 +109,14 @@ impl<F: Num> Search<F> {
         self.place = select(closer, place, self.place);
         self.way = select(closer, way, self.way);
         self.square = F::select(closer, square, self.square);
+        // a closer place replaces one on the top
         self.on_top = self.on_top & !closer;
     }
 
     /// The place of an edge of the top that is nearest to a point.
     #[inline(always)]
     fn offer_edge(&mut self, [a, edge]: [Vec3<F>; 2], x: Vec3<F>) {
+        // t = e · (x - a)/(e · e), clamped to the edge; an edge of the top has length
         let share = edge.dot(x - a).div(edge.dot(edge));
         let share = share.max(F::c(0.0)).min(F::c(1.0));
         self.offer(edge.scale_add(share, a), x);
@@ -130,6 +133,7 @@ impl<F: Num> Search<F> {
     /// edge, seen from above.
     #[inline(always)]
     fn offer_side(&mut self, [a, edge]: [Vec3<F>; 2], inverse: F, x: Vec3<F>, bottom: F) {
+        // nearest as seen from above, then at the point's height between bottom and edge
         let way = x - a;
         let along = edge[0].fma(way[0], edge[1] * way[1]);
         let share = (along * inverse).max(F::c(0.0)).min(F::c(1.0));
@@ -140,6 +144,7 @@ impl<F: Num> Search<F> {
     /// The nearest place, of a prism whose top has this normal.
     #[inline(always)]
     fn nearest(&self, up: Vec3<F>) -> Nearest<F> {
+        // the way at unit length; only one to a place on the top may have no length
         let distance = self.square.sqrt();
         let unit = F::c(1.0).div(distance.max(F::c(TINY)));
         Nearest {
@@ -172,12 +177,15 @@ impl<F: Num> Prism<F> {
         half: Half<F::Mask>,
         lattice: &Lattice<F>,
     ) -> Prism<F> {
+        // heights of the corners
         let [p, q, k] = [top[0][2], top[1][2], top[2][2]];
         let [x, y] = lattice.inverse;
         // how much the top falls along x and y
         let (u, v) = (half.pick(k - q, p - k) * x, half.pick(p - k, k - q) * y);
+        // the top's normal is (u, v, 1), of unit length
         let unit = F::c(1.0).div(u.fma(u, v.fma(v, F::c(1.0))).sqrt());
         let side = half.pick(F::c(1.0), F::c(-1.0));
+        // QK runs along x and KP along y in the upper left prism, the other way round in the lower right one
         let (x, y) = (x * x, y * y);
         Prism {
             top,
@@ -205,6 +213,7 @@ impl<F: Num> Prism<F> {
     /// How far a point lies beyond each of its faces [m].
     #[inline(always)]
     pub fn beyond(&self, x: Vec3<F>) -> [F; 5] {
+        // P is on the top and the diagonal, K on the top and both other sides
         let [p, _, k] = self.top;
         let (from_p, from_k) = (x - p, x - k);
         [
@@ -219,6 +228,7 @@ impl<F: Num> Prism<F> {
     /// The place nearest to a point. From inside, the way out is through the nearest face.
     #[inline(always)]
     pub fn nearest(&self, x: Vec3<F>) -> Nearest<F> {
+        // outside: the nearest place of faces and edges. Inside: the way out
         let (beyond, mut search) = (self.beyond(x), Search::new());
         self.offer_faces(x, beyond, &mut search);
         let [pq, qk, kp] = self.top_edges();
@@ -232,6 +242,7 @@ impl<F: Num> Prism<F> {
     #[inline(always)]
     pub fn nearest_to_segment(&self, half: Vec3<F>) -> Nearest<F> {
         let mut search = Search::new();
+        // edges of the top and the vertical ones below its corners, against the whole segment
         let square = half.dot(half).max(F::c(TINY));
         let inverse = F::c(1.0).div(square);
         let [pq, qk, kp] = self.top_edges();
@@ -239,6 +250,7 @@ impl<F: Num> Prism<F> {
         search.offer_segment(qk, half, square, inverse);
         search.offer_segment(kp, half, square, inverse);
         self.offer_edges_below(half, square, inverse, &mut search);
+        // faces against either end; an end inside has its way out
         let (from, to) = (self.beyond(half), self.beyond(-half));
         self.offer_faces(half, from, &mut search);
         self.offer_faces(-half, to, &mut search);
@@ -251,11 +263,13 @@ impl<F: Num> Prism<F> {
     #[inline(always)]
     fn offer_edges_below(&self, half: Vec3<F>, square: F, inverse: F, search: &mut Search<F>) {
         let one = F::c(1.0);
+        // squared length of half the segment as seen from above
         let flat = half[0].fma(half[0], half[1] * half[1]);
         // of a vertical segment any place will do
         let unit = one.div(flat.max(square * F::c(1e-12)));
         for i in 0..3 {
             let Vec3([x, y, z]) = self.top[i];
+            // share nearest to the vertical line, its height clamped to the edge, then the share for that place
             let along = half[0].fma(x, half[1] * y);
             let s = (along * unit).max(-one).min(one);
             let height = (half[2] * s).max(self.bottom).min(z);
@@ -269,10 +283,12 @@ impl<F: Num> Prism<F> {
     fn offer_faces(&self, x: Vec3<F>, beyond: [F; 5], search: &mut Search<F>) {
         let c = F::c;
         let zero = c(0.0);
+        // the point's foot on the plane of the top counts if it is beyond no side and the point is not below
         let above = self.up.scale_add(-beyond[0], x);
         let foot = self.beyond(above);
         let square = beyond[0] * beyond[0];
         let on_top = !zero.lt(foot[1].max(foot[2]).max(foot[3])) & !beyond[0].lt(zero);
+        // not by `offer`: a point on the top has no way to it, but the top's normal
         let on_top = on_top & square.lt(search.square);
         search.place = select(on_top, above, search.place);
         search.square = F::select(on_top, square, search.square);
@@ -282,6 +298,7 @@ impl<F: Num> Prism<F> {
         search.offer_side(pq, u, x, self.bottom);
         search.offer_side(qk, v, x, self.bottom);
         search.offer_side(kp, w, x, self.bottom);
+        // straight down to the bottom; elsewhere the place is too far to be nearer
         let below = !zero.lt(beyond[1].max(beyond[2]).max(beyond[3])) & zero.lt(beyond[4]);
         let place = Vec3([x[0], x[1], F::select(below, self.bottom, c(1e16))]);
         search.offer(place, x);
@@ -290,6 +307,7 @@ impl<F: Num> Prism<F> {
     /// The way out through the nearest face, for a point inside; far away for one outside.
     #[inline(always)]
     fn way_out(&self, x: Vec3<F>, beyond: [F; 5]) -> Nearest<F> {
+        // of a point inside all distances are negative: the largest is the nearest face
         let mut normal = self.up;
         let mut distance = beyond[0];
         for (m, beyond) in self.normals().into_iter().zip(beyond).skip(1) {
@@ -313,6 +331,7 @@ impl<F: Num> Prism<F> {
     /// Its least and greatest reach along a direction.
     #[inline(always)]
     pub fn span(&self, d: Vec3<F>) -> [F; 2] {
+        // each corner of the top, and that of the bottom below it
         let level = d[2] * self.bottom;
         let (mut low, mut high) = (F::c(1e18), F::c(-1e18));
         for a in self.top {
@@ -327,6 +346,7 @@ impl<F: Num> Prism<F> {
     /// The corner of its top that is least along a level direction.
     #[inline(always)]
     pub fn nearest_corner(&self, d: Vec3<F>) -> Vec3<F> {
+        // of equally near corners the first stays
         let [p, q, k] = self.top;
         let best = select(q.dot(d).lt(p.dot(d)), q, p);
         select(k.dot(d).lt(best.dot(d)), k, best)
@@ -347,6 +367,7 @@ impl<F: Num> Prism<F> {
 fn nearest_shares<F: Num>(half: Vec3<F>, hh: F, inverse: F, a: Vec3<F>, edge: Vec3<F>) -> (F, F) {
     let c = F::c;
     let (zero, one) = (c(0.0), c(1.0));
+    // minimum of |half s - a - edge t|² over s, then t, then s again for a t that was clamped
     let (he, ee) = (half.dot(edge), edge.dot(edge).max(c(TINY)));
     let (ha, ea) = (half.dot(a), edge.dot(a));
     let square = he.fnma(he, hh * ee);
@@ -361,10 +382,12 @@ fn nearest_shares<F: Num>(half: Vec3<F>, hh: F, inverse: F, a: Vec3<F>, edge: Ve
 impl<C: Cx> Support<C> for Prism<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        // farthest below or above: corners of the bottom are straight below those of the top
         let is_down = d[2].lt(C::F::c(0.0));
         let corner = |a: Vec3<C::F>| Vec3([a[0], a[1], C::F::select(is_down, self.bottom, a[2])]);
         let [p, q, k] = self.top;
         let (p, q, k) = (corner(p), corner(q), corner(k));
+        // of equally far corners the first stays
         let second = p.dot(d).lt(q.dot(d));
         let best = select(second, q, p);
         select(best.dot(d).lt(k.dot(d)), k, best)

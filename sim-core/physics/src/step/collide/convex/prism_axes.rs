@@ -73,14 +73,17 @@ impl<F: Num> Search<F> {
         limits: Limits<F>,
         code: f64,
     ) {
+        // distances along n and along -n; the larger is a bound in any case
         let (along, against) = (low - half, -high - half);
         self.gap = self.gap.max(along).max(against);
+        // n is turned against the top's normal, or where any will do to the larger distance
         let any = limits.facing < 0.0;
         let turned = match any {
             true => along.lt(against),
             false => F::c(0.0).lt(rise),
         };
         let distance = F::select(turned, against, along);
+        // better by the tolerance, and within the angle to the top's normal
         let mut is = (self.distance + limits.tolerance).lt(distance);
         if !any {
             is = is & F::c(limits.facing).lt(rise.abs());
@@ -104,6 +107,7 @@ impl<F: Num> Search<F> {
         let far = F::c(1e18);
         let low = F::select(common.parallel, -far, common.span[0]);
         let high = F::select(common.parallel, far, common.span[1]);
+        // an infinite span makes both distances negative, so it is never taken
         let (n, half) = (common.normal, other.reach(common.normal));
         self.offer(n, [low, high], half, n.dot(up), limits, code);
     }
@@ -111,6 +115,7 @@ impl<F: Num> Search<F> {
     /// As [`Search::offer`] for the outward normal of a face of the prism that is this far from the other shape.
     #[inline(always)]
     fn offer_face(&mut self, n: Vec3<F>, distance: F, rise: F, limits: Limits<F>) {
+        // n is outward of the prism, so the axis from the other shape is -n
         self.gap = self.gap.max(distance);
         let is = (self.distance + limits.tolerance).lt(distance) & F::c(limits.facing).lt(rise);
         self.normal = select(is, -n, self.normal);
@@ -122,9 +127,11 @@ impl<F: Num> Search<F> {
 impl<F: Num> OwnPrism<F> {
     #[inline(always)]
     fn new(prism: &Prism<F>, axes: &Mat3<F>) -> OwnPrism<F> {
+        // columns of axesᵀ: the field's axes as seen in the other's
         let Mat3(field) = transpose(axes);
         let (mut top, mut bottom) = (prism.top, prism.top);
         for i in 0..3 {
+            // corners of the bottom are straight below those of the top
             let height = prism.bottom - prism.top[i][2];
             top[i] = axes.transpose_mul(prism.top[i]);
             bottom[i] = field[2].scale_add(height, top[i]);
@@ -142,6 +149,7 @@ impl<F: Num> OwnPrism<F> {
     fn span(&self, j: usize) -> [F; 2] {
         let [a, b, c] = self.top;
         let [p, q, r] = self.bottom;
+        // over all six corners
         let low = a[j].min(b[j]).min(c[j]).min(p[j].min(q[j]).min(r[j]));
         let high = a[j].max(b[j]).max(c[j]).max(p[j].max(q[j]).max(r[j]));
         [low, high]
@@ -163,8 +171,10 @@ impl<F: Num> OwnPrism<F> {
     /// The common normal of edge `I` and axis `J` of the other shape. A loop over both is not unrolled.
     #[inline(always)]
     fn across<const I: usize, const J: usize>(&self, (edge, length): (Vec3<F>, F)) -> Common<F> {
+        // e × axis J has the components (e_l, -e_k) along k and l alone
         let (k, l) = ((J + 1) % 3, (J + 2) % 3);
         let (x, y) = (edge[l], -edge[k]);
+        // |e × axis| is |e| sin; below a small part of |e| the edges count as parallel
         let square = x.fma(x, y * y);
         let least = length * F::c(ALONG);
         let unit = F::c(1.0).div(square.max(least).sqrt());
@@ -172,6 +182,7 @@ impl<F: Num> OwnPrism<F> {
         let (a, b) = (self.top[I % 3], self.top[(I + 2) % 3]);
         let (a, b) = (x.fma(a[k], y * a[l]), x.fma(b[k], y * b[l]));
         let (mut low, mut high) = (a.min(b), a.max(b));
+        // an edge of the top: the bottom's corners too. A vertical one: the third corner of the top
         if I < 3 {
             let [p, q, r] = self.bottom;
             let (p, q) = (x.fma(p[k], y * p[l]), x.fma(q[k], y * q[l]));
@@ -183,6 +194,7 @@ impl<F: Num> OwnPrism<F> {
             let c = x.fma(c[k], y * c[l]);
             (low, high) = (low.min(c), high.max(c));
         }
+        // spans scale to the unit normal
         let mut normal = [F::c(0.0); 3];
         normal[k] = x * unit;
         normal[l] = y * unit;
@@ -213,6 +225,7 @@ impl<F: Num> OwnPrism<F> {
     ) {
         // the edges below its corners are parallel: one axis for all three
         let [pq, qk, kp, down] = self.edges();
+        // code 3 + 4 J + I names the pair of edges
         let code = (3 + 4 * J) as f64;
         best.offer_common(&self.across::<0, J>(pq), self.up, other, limits, code);
         best.offer_common(&self.across::<1, J>(qk), self.up, other, limits, code + 1.0);
@@ -239,6 +252,7 @@ impl<F: Num> Common<F> {
     /// The distance of the prism and the other shape.
     #[inline(always)]
     fn gap<R: Reach<F>>(&self, other: &R, radius: F) -> F {
+        // distance along n or -n; parallel edges have none
         let half = other.reach(self.normal) + radius;
         let gap = (self.span[0] - half).max(-self.span[1] - half);
         F::select(self.parallel, F::c(-1e18), gap)
@@ -257,19 +271,23 @@ impl<F: Num> Prism<F> {
         field: &FieldReach<F>,
         with_edges: bool,
     ) -> F {
+        // how far the origin, the other's centre, lies beyond each face
         let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
         let local = OwnPrism::new(self, axes);
+        // normals of sides and bottom are the same for all prisms, so their reaches are known
         let mut gap = (x - field.half[0]).max(y - field.half[1]);
         gap = gap
             .max(across - field.across)
             .max(bottom - field.half[2])
             .max(top - other.reach(local.up) - radius);
+        // faces of the other shape: the prism's span against half its width to either side
         for &j in R::FACES {
             let mut unit = [F::c(0.0); 3];
             unit[j] = F::c(1.0);
             let (half, [low, high]) = (other.reach(Vec3(unit)) + radius, local.span(j));
             gap = gap.max(low - half).max(-high - half);
         }
+        // pairs of edges; which axes have edges is known at compile time
         if with_edges {
             if R::EDGES.contains(&0) {
                 gap = local.gap_across::<0, R>(other, radius, gap);
@@ -299,6 +317,7 @@ impl<F: Num> Prism<F> {
         let c = F::c;
         let local = OwnPrism::new(self, axes);
         let [top, x, y, across, bottom] = self.beyond(Vec3::zero());
+        // the top's normal first: it faces the top, so it may always be the way out
         let distance = top - other.reach(local.up);
         let mut best = Search {
             normal: -local.up,
@@ -307,6 +326,7 @@ impl<F: Num> Prism<F> {
             code: c(0.0),
         };
         let limits = Limits { tolerance, facing };
+        // sides and bottom: outward normals in the other's axes
         let [u, v, w] = local.field;
         let (side, [a, b]) = (self.side, self.across);
         let m = u * -side;
@@ -316,12 +336,14 @@ impl<F: Num> Prism<F> {
         let m = u.scale_add(a, v * b);
         best.offer_face(m, across - other.reach(m), m.dot(local.up), limits);
         best.offer_face(-w, bottom - other.reach(w), -w.dot(local.up), limits);
+        // faces of the other; the cosine to the top's normal is a component of `up`
         for &j in R::FACES {
             let mut unit = [c(0.0); 3];
             unit[j] = c(1.0);
             let (unit, rise) = (Vec3(unit), local.up[j]);
             best.offer(unit, local.span(j), other.reach(unit), rise, limits, 2.0);
         }
+        // pairs of edges, by axis of the other
         if R::EDGES.contains(&0) {
             local.offer_across::<0, R>(other, limits, &mut best);
         }
@@ -341,9 +363,11 @@ impl<F: Num> Prism<F> {
         let code = best.code;
         // the normal of the top as it is, without the error of two rotations
         let normal = select(code.lt(c(0.5)), -self.up, *axes * best.normal);
+        // from code = 3 + 4 j + i: axis j of the other, edge i of the prism
         let j = F::select(code.lt(c(6.5)), c(0.0), c(1.0));
         let j = F::select(code.lt(c(10.5)), j, c(2.0));
         let i = code - j.fma(c(4.0), c(3.0));
+        // a point and the direction of edge i; of a vertical one, the corner nearest along the normal
         let [p, q, k] = self.top;
         let [[_, pq], [_, qk], [_, kp]] = self.top_edges();
         let (first, second, third) = (i.lt(c(0.5)), i.lt(c(1.5)), i.lt(c(2.5)));
@@ -351,6 +375,7 @@ impl<F: Num> Prism<F> {
         let way = select(third, kp, Vec3([c(0.0), c(0.0), c(-1.0)]));
         let corner = select(first, p, select(second, q, corner));
         let way = select(first, pq, select(second, qk, way));
+        // codes 0 and 1 are faces of the prism, 2 of the other, and edges from 3 on
         let of_edges = F::select(c(2.5).lt(code), c(2.0), c(1.0));
         PrismAxis {
             axis: SeparatingAxis {

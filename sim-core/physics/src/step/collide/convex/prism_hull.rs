@@ -58,9 +58,11 @@ impl FieldNarrow for OfHull {
                 axes: *axes,
                 center: Vec3::zero(),
             };
+            // `start` is the best face that may be the way out; `gap` bounds the distance from below
             let (start, gap) = best_face(cx, prism, &first);
             when!(cx, gap.lt(limit), {
                 let all = size + prism.radius();
+                // GJK from that face, and the contact along it for worlds where GJK's normal is no way out
                 let closest =
                     closest_points(cx, &first, prism, start.normal, all, limit, &NoRestart);
                 let corner = first.farthest(cx, start.normal);
@@ -73,6 +75,7 @@ impl FieldNarrow for OfHull {
                 };
                 let near = facing_or(prism, closest, deep);
                 when!(cx, near.distance.lt(limit), {
+                    // a polygon where the triangle lies flat, or a face of the hull on a triangle that faces it
                     let face = hull_face(cx, &hull, axes, near.normal);
                     let features = FeaturePair {
                         flat: aligned(prism.up, near.normal)
@@ -111,6 +114,7 @@ struct FaceSearch<C: Cx> {
 impl<C: Cx> FaceSearch<C> {
     #[inline(always)]
     fn offer(&mut self, cx: &mut C, prism: &Prism<C::F>, n: Vec3<C::F>, x: C::F) {
+        // the way out is against the top's normal; any axis bounds the distance
         let (old, widest, kept) = (
             cx.get(&self.distance),
             cx.get(&self.gap),
@@ -136,10 +140,12 @@ fn best_face<C: Cx>(
         normal: var3(cx, -prism.up),
         gap: cx.var(c(-1e18)),
     };
+    // normals point from the hull to the prism: inward of the prism. Distance: least (b - a) along them
     for face in prism.normals() {
         let (_, way) = minkowski_support(cx, posed, prism, -face);
         search.offer(cx, prism, -face, -way.dot(face));
     }
+    // outward of the hull, whose centre is the origin: distance = least reach of the prism - offset
     let faces = posed.hull.tables.faces;
     let (first, end) = posed.hull.span(cx, Part::Faces);
     span!(cx, face in first, end, {

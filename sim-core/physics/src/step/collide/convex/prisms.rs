@@ -105,6 +105,7 @@ pub(in crate::step::collide) fn centred<F: Num>(axes: &Mat3<F>) -> ShapePose<F> 
 /// The point half-way between surfaces, from what is nearest to a point that has a radius around it.
 #[inline(always)]
 fn around<F: Num>(near: &Nearest<F>, radius: F) -> Separation<F> {
+    // distance of the surfaces; their middle is half of it away from the place on the prism
     let distance = near.distance - radius;
     Separation {
         normal: -near.normal,
@@ -139,6 +140,7 @@ impl FieldNarrow for OfSphere {
         prism: &Prism<C::F>,
         out: &mut Points<C>,
     ) {
+        // the nearest place in the field's axes, then in those of the pair
         let near = around(&prism.nearest(Vec3::zero()), pair.a.radius());
         let (point, normal) = (
             pair.pose_b.axes * near.point,
@@ -157,6 +159,7 @@ impl FieldNarrow for OfCapsule {
 
     #[inline(always)]
     fn half_extents<F: Num>(size: Vec3<F>, axes: &Mat3<F>) -> Vec3<F> {
+        // a half height along the axis, and a radius in any direction: |a_i| h + r
         let reach = |i: usize| axes[2][i].abs().fma(size[1], size[0]);
         Vec3([reach(0), reach(1), reach(2)])
     }
@@ -191,17 +194,21 @@ impl FieldNarrow for OfCapsule {
         let mut distance = cx.var(apart.distance);
         // no face is between them: the axis may pass through the prism
         let (from, to) = (prism.beyond(shape.half), prism.beyond(-shape.half));
+        // the largest distance by which both ends are beyond the same face
         let mut gap = C::F::c(-1e18);
         for (x, y) in from.into_iter().zip(to) {
             gap = gap.max(x.min(y));
         }
         when!(cx, !C::F::c(0.0).lt(gap), {
+            // separating axes of the capsule's segment; its radius is added below
             let size = PosedShape::<C>::size(&shape) + prism.radius();
             let reach = PosedShape::<C>::reach(&shape);
             let best = prism.best_axis(axes, &reach, axis_tolerance(size), ANY);
+            // no axis separates them: depth of the axis in the prism, and the radius
             when!(cx, !C::F::c(0.0).lt(best.gap), {
                 let core = PosedShape::<C>::core(&shape);
                 let deep = penetration(cx, prism, &core, &best);
+                // from the middle for the axis to that for the surface
                 let half = deep.normal * (C::F::c(0.5) * radius);
                 set3(cx, &mut normal, deep.normal);
                 set3(cx, &mut point, deep.point + half);
@@ -249,6 +256,7 @@ impl FieldNarrow for OfBox {
             pose: centred(axes),
             half: pair.a.half_extents(),
         };
+        // the best axis rejects, and is exact in penetration
         let core = PosedShape::<C>::core(&shape);
         let size = PosedShape::<C>::size(&shape) + prism.radius();
         let reach = PosedShape::<C>::reach(&shape);
@@ -259,6 +267,7 @@ impl FieldNarrow for OfBox {
             let mut normal = var3(cx, deep.normal);
             let mut point = var3(cx, deep.point);
             let mut distance = cx.var(deep.distance);
+            // apart along an axis: GJK goes on from the best one
             when!(cx, c(0.0).lt(best.gap), {
                 let start = best.axis.normal;
                 let closest = closest_points(cx, &core, prism, start, size, limit, &NoRestart);
@@ -285,6 +294,7 @@ impl FieldNarrow for OfCylinder {
     #[inline(always)]
     fn half_extents<F: Num>(size: Vec3<F>, axes: &Mat3<F>) -> Vec3<F> {
         let reach = |i: usize| {
+            // h |a_i| + r √(1 - a_i²), where rounding must not make the root's argument negative
             let along = axes[2][i];
             let across = along.fnma(along, F::c(1.0)).max(F::c(0.0)).sqrt();
             size[0].fma(across, size[1] * along.abs())
@@ -313,11 +323,13 @@ impl FieldNarrow for OfCylinder {
             radius: pair.a.radius(),
             half_height: pair.a.half_height(),
         };
+        // the best axis rejects, and is where GJK begins
         let size = PosedShape::<C>::size(&shape) + prism.radius();
         let reach = PosedShape::<C>::reach(&shape);
         let best = prism.best_axis(axes, &reach, axis_tolerance(size), FACING);
         let limit = pair.margin;
         when!(cx, best.gap.lt(limit), {
+            // in deep penetration GJK restarts from sampled directions, since a cylinder is curved
             let restart = DirectionSamples {
                 axes: *axes,
                 center: Vec3::zero(),
@@ -328,6 +340,7 @@ impl FieldNarrow for OfCylinder {
             let core = PosedShape::<C>::core(&shape);
             let start = best.axis.normal;
             let closest = closest_points(cx, &core, prism, start, size, limit, &restart);
+            // the contact along the best axis, where GJK's normal is no way out
             let deep = penetration(cx, prism, &core, &best);
             let near = facing_or(prism, closest, deep);
             add_touching(cx, pair, &shape, prism, &near, out);
@@ -343,6 +356,7 @@ pub(in crate::step::collide) fn facing_or<F: Num>(
     deep: Separation<F>,
 ) -> Separation<F> {
     let c = F::c;
+    // within 60° of the triangle's normal, or apart
     let is_out = c(FACING).lt(-prism.up.dot(closest.normal)) | c(0.0).lt(closest.distance);
     Separation {
         normal: select(is_out, closest.normal, deep.normal),
@@ -368,6 +382,7 @@ fn add_touching<C: Cx, A: FacetedShape<C>>(
     out: &mut Points<C>,
 ) {
     when!(cx, near.distance.lt(pair.margin), {
+        // a polygon where the triangle lies flat, or a feature of the shape on a triangle that faces it
         let feature = shape.feature(near.normal);
         let on_top = aligned(prism.up, near.normal);
         let features = FeaturePair {
@@ -393,6 +408,7 @@ fn penetration<C: Cx>(
 ) -> Separation<C::F> {
     let c = C::F::c;
     let n = best.axis.normal;
+    // from the shape's surface to the middle: half the (negative) distance along n
     let half = n * (c(0.5) * best.axis.distance);
     // a face of the prism: the other's farthest point
     let corner = core.farthest(cx, n);
@@ -401,11 +417,13 @@ fn penetration<C: Cx>(
     let of_other = Support::<C>::farthest(prism, cx, -n) - half;
     // edges x = p + s d of the prism and x = r + t q of the other, n across both: (p - r + s d - t q) ∥ n
     let ([p, d], q) = (best.edge, best.other);
+    // s = ((r - p) · d - (d · q) (r - p) · q)/(1 - (d · q)²); of nearly parallel edges it stays finite
     let mixed = d.dot(q);
     let square = mixed.fnma(mixed, c(1.0)).max(c(1e-7));
     let way = corner - p;
     let s = mixed.fnma(way.dot(q), way.dot(d)).div(square);
     let of_edges = d.scale_add(s, p) - half;
+    // kind is 0, 1 or 2
     let (is_other, is_edges) = (c(0.5).lt(best.kind), c(1.5).lt(best.kind));
     Separation {
         normal: n,

@@ -98,18 +98,22 @@ impl<C: Cx, A: Reach<C::F>, B: Extent<C>> Restart<C> for DirectionSamples<C::F, 
         tried: Vec3<C::F>,
     ) -> SeparatingAxis<C::F> {
         let c = C::F::c;
+        // where every direction is left out the distance stays below any
         let mut best = cx.var(c(-1e18));
         let mut axis = var3(cx, known.normal);
         times!(cx, i in DIRECTIONS, {
             // Fibonacci's spiral: equal areas, turned by the golden angle (Vogel 1979)
+            // z = (2 i + 1)/N - 1: the middle of band i of N bands of equal area
             let number = cx.number(i);
             let z = number.fma(c(2.0 / DIRECTIONS as f64), c(1.0 / DIRECTIONS as f64 - 1.0));
             let width = z.fnma(z, c(1.0)).sqrt();
             let (sin, cos) = (number * c(2.399_963_229_728_653)).sincos();
             let n = Vec3([cos * width, sin * width, z]);
+            // distance along n: min n · B - max n · A
             let reach = self.b.extent(cx, -n) + self.a.reach(self.axes.transpose_mul(n));
             let distance = -(reach + n.dot(self.center));
             let old = cx.get(&best);
+            // away from the best axis and from the last start
             let other = n.dot(known.normal).max(n.dot(tried)).lt(c(KNOWN));
             let is = old.lt(distance) & other;
             let kept = get3(cx, &axis);

@@ -58,6 +58,7 @@ impl<C: Cx> Simplex<C> {
     #[inline(always)]
     fn new(cx: &mut C, w: Vec3<C::F>, on_a: Vec3<C::F>) -> Self {
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
+        // one point, three times, with all weight on the first
         Simplex {
             corners: [var3(cx, w), var3(cx, w), var3(cx, w)],
             points: [var3(cx, on_a), var3(cx, on_a), var3(cx, on_a)],
@@ -69,6 +70,7 @@ impl<C: Cx> Simplex<C> {
     /// The edges from a new corner to those of the simplex.
     #[inline(always)]
     fn edges_from(&self, cx: &mut C, w: Vec3<C::F>) -> Edges<C::F> {
+        // the corners kept, and their points of A
         let o = [
             get3(cx, &self.corners[0]),
             get3(cx, &self.corners[1]),
@@ -79,6 +81,7 @@ impl<C: Cx> Simplex<C> {
             get3(cx, &self.points[1]),
             get3(cx, &self.points[2]),
         ];
+        // e_k = o_k - w
         let e = [o[0] - w, o[1] - w, o[2] - w];
         Edges {
             w,
@@ -92,6 +95,7 @@ impl<C: Cx> Simplex<C> {
     /// Keeps the new corner, with the others of the edge or face that the nearest point is on.
     #[inline(always)]
     fn keep(&mut self, cx: &mut C, w: Vec3<C::F>, on_a: Vec3<C::F>, best: &Nearest<C::F>) {
+        // the new corner first, then the ends of the edge or face, as the shares have them
         let [o1, o2] = best.corners;
         let [p1, p2] = best.points;
         for (place, x) in [(0, w), (1, o1), (2, o2)] {
@@ -100,6 +104,7 @@ impl<C: Cx> Simplex<C> {
         for (place, x) in [(0, on_a), (1, p1), (2, p2)] {
             set3(cx, &mut self.points[place], x);
         }
+        // nearest point = (1 - s - t) w + s o₁ + t o₂
         set3(
             cx,
             &mut self.shares,
@@ -111,6 +116,7 @@ impl<C: Cx> Simplex<C> {
     /// The point of A that belongs to the nearest point.
     #[inline(always)]
     fn on_a(&self, cx: &C) -> Vec3<C::F> {
+        // the point of A has the shares of the nearest point: each corner is a point of B less one of A
         let share = get3(cx, &self.shares);
         let (p0, p1, p2) = (
             get3(cx, &self.points[0]),
@@ -146,6 +152,7 @@ impl<F: Num> Nearest<F> {
     /// Takes the corners k and the next one where the mask holds.
     #[inline(always)]
     fn take_corners(&mut self, is: F::Mask, edges: &Edges<F>, k: usize) {
+        // of a face both corners have shares; of an edge the second has none (t = 0)
         let (o, p, l) = (&edges.corners, &edges.points, (k + 1) % 3);
         self.corners = [
             select(is, o[k], self.corners[0]),
@@ -164,7 +171,9 @@ impl<F: Num> Edges<F> {
     fn nearest_on_edges(&self) -> Nearest<F> {
         let (zero, one) = (F::c(0.0), F::c(1.0));
         let (w, e) = (self.w, &self.e);
+        // w + t e is nearest to the origin at t = -(e · w)/(e · e)
         let along = [e[0].dot(w), e[1].dot(w), e[2].dot(w)];
+        // farther than any edge: the first one replaces it
         let mut best = Nearest {
             square: F::c(1e18),
             s: zero,
@@ -174,12 +183,14 @@ impl<F: Num> Edges<F> {
             points: [self.points[0], self.points[1]],
         };
         for k in 0..3 {
+            // clamped to the edge; an edge without length stays finite
             let t = (-along[k])
                 .div(self.squares[k].max(F::c(1e-30)))
                 .max(zero)
                 .min(one);
             let x = e[k].scale_add(t, w);
             let square = x.dot(x);
+            // of edges that are equally near the first stays
             let is = square.lt(best.square);
             best.square = F::select(is, square, best.square);
             best.foot = select(is, x, best.foot);
@@ -196,20 +207,26 @@ impl<F: Num> Edges<F> {
     fn nearest_on_faces(&self, best: &mut Nearest<F>) {
         let (zero, one) = (F::c(0.0), F::c(1.0));
         let (w, e, ee) = (self.w, &self.e, &self.squares);
+        // e × w
         let moment = [e[0].cross(w), e[1].cross(w), e[2].cross(w)];
         for k in 0..3 {
             let l = (k + 1) % 3;
+            // normal of the face, n = e_k × e_l, and 1/n², guarded for faces without area
             let area = e[k].cross(e[l]);
             let square = area.dot(area);
             let inverse = one.div(square.max(F::c(1e-36)));
+            // w + s e_k + t e_l ∥ n: s = (e_l × w) · n/n², t = -(e_k × w) · n/n²
             let s = moment[l].dot(area) * inverse;
             let t = -(moment[k].dot(area) * inverse);
+            // squared distance of the face's plane: (n · w)²/n²
             let height = area.dot(w);
             let distance = height * height * inverse;
             // of a triangle without area only the edges count
             let wide = (ee[k] * ee[l] * F::c(1e4 * F::Real::EPSILON * F::Real::EPSILON)).lt(square);
+            // all three barycentric coordinates are positive
             let inside = zero.lt(s) & zero.lt(t) & (s + t).lt(one);
             let is = wide & inside & distance.lt(best.square);
+            // foot = n (n · w)/n²
             best.square = F::select(is, distance, best.square);
             best.foot = select(is, area * (height * inverse), best.foot);
             best.s = F::select(is, s, best.s);
@@ -230,12 +247,15 @@ pub(in crate::step::collide) fn gjk_distance<C: Cx>(
     limit: C::F,
 ) -> Distance<C::F> {
     let c = C::F::c;
+    // relative tolerance of |v|², and rounding of a length
     let tolerance = c(tolerance::<RealOf<C>>());
     let noise = size * c(RealOf::<C>::EPSILON);
+    // the lower bound begins with the distance along the start axis
     let mut simplex = Simplex::new(cx, start.w, start.on_a);
     let mut normal = var3(cx, start.axis);
     let mut low = cx.var(start.axis.dot(start.w));
     times!(cx, iterations::<RealOf<C>>(), {
+        // v, the nearest point of the simplex, and the support point w that is least along it
         let v = get3(cx, &simplex.nearest);
         let square = v.dot(v);
         let length = square.sqrt();
@@ -245,15 +265,18 @@ pub(in crate::step::collide) fn gjk_distance<C: Cx>(
         let along = v.dot(w);
         let unit = c(1.0).div(length.max(c(1e-18)));
         let bound = along * unit;
+        // the largest lower bound so far, and its axis: bounds need not grow from one iteration to the next
         let old = cx.get(&low);
         let better = old.lt(bound);
         let kept = get3(cx, &normal);
         cx.set(&mut low, C::F::select(better, bound, old));
         set3(cx, &mut normal, select(better, v * unit, kept));
+        // done when both bounds agree, |v|² - v · w ≈ 0, or when the lower one is past the limit
         let done = (square - along).lt(tolerance.fma(square, noise * length));
         let done = done | limit.lt(bound);
         break_if!(cx, done);
 
+        // nearest point of the tetrahedron of w and the three corners: edges, then faces that are nearer
         let edges = simplex.edges_from(cx, w);
         let mut best = edges.nearest_on_edges();
         edges.nearest_on_faces(&mut best);
@@ -262,6 +285,7 @@ pub(in crate::step::collide) fn gjk_distance<C: Cx>(
         break_if!(cx, stuck);
         simplex.keep(cx, w, on_a, &best);
     });
+    // the closest point of A, the best axis and its bound
     Distance {
         on_a: simplex.on_a(cx),
         normal: get3(cx, &normal),

@@ -48,10 +48,13 @@ impl<F: Num, A: Reach<F> + Copy, B: Reach<F> + Copy> StartAxes<'_, F, A, B> {
     /// The direction `d`, or the one against it; without length it is no axis.
     #[inline(always)]
     pub fn along(&self, d: Vec3<F>) -> BestStart<F> {
+        // 1/|d|, guarded for a direction without length
         let square = d.dot(d);
         let unit = F::c(1.0).div(square.max(F::c(1e-16)).sqrt());
+        // the second shape is at the origin: the normal points against the side of the first's centre
         let height = d.dot(self.pose.center);
         let normal = d * with_sign(-unit, height);
+        // distance along the normal: |d · center|/|d| less both reaches
         let reach = self.a.reach(self.pose.axes.transpose_mul(normal)) + self.b.reach(normal);
         let distance = F::select(
             F::c(1e-14).lt(square),

@@ -56,6 +56,7 @@ impl<C: Cx> Support<C> for PointCore<C::F> {
 impl<C: Cx> Support<C> for SegmentCore<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        // the end on the side of d
         let side = with_sign(C::F::c(1.0), self.half.dot(d));
         self.half.scale_add(side, self.center)
     }
@@ -64,6 +65,7 @@ impl<C: Cx> Support<C> for SegmentCore<C::F> {
 impl<C: Cx> Support<C> for BoxCore<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        // d in the box's axes: its signs name the corner
         let (one, x) = (C::F::c(1.0), self.half.transpose_mul(d));
         let side = [
             with_sign(one, x[0]),
@@ -78,7 +80,9 @@ impl<C: Cx> Support<C> for LocalCylinder<C::F> {
     #[inline(always)]
     fn farthest(&self, _: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
         // along the axis any point of the cap is farthest
+        // length of d across z
         let width = d[0].fma(d[0], d[1] * d[1]).sqrt().max(C::F::c(1e-18));
+        // on the rim along d's part across z, at the cap on d's side
         let rim = self.radius.div(width);
         Vec3([d[0] * rim, d[1] * rim, with_sign(self.half_height, d[2])])
     }
@@ -87,6 +91,7 @@ impl<C: Cx> Support<C> for LocalCylinder<C::F> {
 impl<C: Cx> Support<C> for CylinderCore<C::F> {
     #[inline(always)]
     fn farthest(&self, cx: &mut C, d: Vec3<C::F>) -> Vec3<C::F> {
+        // as a cylinder along z, in its own axes
         let local = LocalCylinder {
             radius: self.radius,
             half_height: self.half_height,
@@ -104,6 +109,7 @@ pub(in crate::step::collide) fn minkowski_support<C: Cx>(
     b: &impl Support<C>,
     d: Vec3<C::F>,
 ) -> (Vec3<C::F>, Vec3<C::F>) {
+    // min d · (B - A) = min d · B - max d · A
     let on_a = a.farthest(cx, d);
     let on_b = b.farthest(cx, -d);
     (on_a, on_b - on_a)

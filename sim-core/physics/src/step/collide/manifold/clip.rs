@@ -50,16 +50,19 @@ impl<F: Num> ClipPlane<F> {
         m: Vec3<F>,
     ) -> ClipPlane<F> {
         let c = F::c;
+        // the first corner, a point of the plane
         let (x, y, h) = (
             cx.load(tables.corners, first, k),
             cx.load(tables.corners, first, k + 1),
             cx.load(tables.corners, first, k + 2),
         );
+        // |m₂| = |m| times the cosine to the viewing normal
         let facing = m[2].abs();
         let length = m.dot(m).sqrt().max(c(1e-18));
         let back = m[2].lt(c(0.0));
         // a plane along the normal keeps finite slopes; it is too steep to be clipped
         let size = facing.max(c(0.01) * length);
+        // m · (x, y, h) is constant on the plane: slopes are -m₀/m₂ and -m₁/m₂
         let k = c(-1.0).div(F::select(back, -size, size));
         let slope = [m[0] * k, m[1] * k];
         ClipPlane {
@@ -81,6 +84,7 @@ impl<F: Num> ClipPlane<F> {
 #[inline(always)]
 fn next_corner<C: Cx>(cx: &mut C, tables: Cut, i: C::I, k: usize) -> C::F {
     let t = tables.corners;
+    // the same table from its second row on; the row past the last corner holds the first again
     let shifted = Table {
         base: t.base + t.stride,
         rows: t.rows - 1,
@@ -94,17 +98,22 @@ impl<F: Num> Clip<F> {
     #[inline(always)]
     pub fn half_planes<C: Cx<F = F>>(&self, cx: &mut C, turn: F) {
         let (c, tables, count) = (F::c, self.tables, self.counts[1]);
+        // a polygon of two corners is a segment
         let segment = count.lt(c(2.5));
         times!(cx, i in CORNERS_MAX, {
+            // the edge from corner i to the next, and 1 over its length; corners that coincide stay finite
             let (x0, y0) = (cx.load(tables.corners, i, 3), cx.load(tables.corners, i, 4));
             let (x1, y1) = (next_corner(cx, tables, i, 3), next_corner(cx, tables, i, 4));
             let (dx, dy) = (x1 - x0, y1 - y0);
             let unit = c(1.0).div(dx.fma(dx, dy * dy).max(c(1e-24)).sqrt());
+            // outward normal (dy, -dx)/|d| of counter-clockwise corners; of a segment its own direction
             let a = F::select(segment, dx * unit, dy * (unit * turn));
             let b = F::select(segment, dy * unit, -(dx * (unit * turn)));
+            // d at the edge's end: for a segment, the line through that end
             cx.fill(tables.corners, i, 6, a);
             cx.fill(tables.corners, i, 7, b);
             cx.fill(tables.corners, i, 8, a.fma(x1, b * y1));
+            // the last edge is i = count - 1; counts are whole, so half of one decides
             let done = (count - c(1.5)).lt(cx.number(i));
             break_if!(cx, done);
         });
@@ -118,6 +127,7 @@ impl<F: Num> Clip<F> {
         // corners on an edge of the other polygon count as inside
         let inclusive = c(1e-5) * self.size;
         times!(cx, i in CORNERS_MAX, {
+            // an edge of the clipped polygon: start + t way, 0 ≤ t ≤ 1
             let start: Vec3<F> = load_each3(cx, tables.corners, i, 0);
             let end = Vec3([
                 next_corner(cx, tables, i, 0),
@@ -125,6 +135,7 @@ impl<F: Num> Clip<F> {
                 next_corner(cx, tables, i, 2),
             ]);
             let way = end - start;
+            // the part of it inside all half-planes so far: low < t < high
             let mut low = cx.var(zero);
             let mut high = cx.var(one);
             times!(cx, j in CORNERS_MAX, {
@@ -133,11 +144,14 @@ impl<F: Num> Clip<F> {
                     cx.load(tables.corners, j, 7),
                     cx.load(tables.corners, j, 8),
                 );
+                // a x + b y - d at both ends: positive is outside
                 let before = a.fma(start[0], b * start[1]) - d - inclusive;
                 let after = a.fma(end[0], b * end[1]) - d - inclusive;
+                // the line is crossed at t = before/fall; where both ends are as far, the divisor 1 keeps t finite
                 let fall = before - after;
                 let level = fall.abs().lt(c(1e-18));
                 let t = before.div(F::select(level, one, fall));
+                // an edge that comes in raises low, one that goes out lowers high
                 let (outside, leaves) = (zero.lt(before), zero.lt(after));
                 let (l, h) = (cx.get(&low), cx.get(&high));
                 // an edge that is outside at both ends has nothing left: low above high
@@ -149,8 +163,10 @@ impl<F: Num> Clip<F> {
             });
             let (l, h) = (cx.get(&low), cx.get(&high));
             let some = l.lt(h);
+            // the end of an edge that is not cut is a candidate as the start of the next edge
             for (slot, t, is) in [(0, l, some), (1, h, some & h.lt(one))] {
                 let Vec3([x, y, height]) = way.scale_add(t, start);
+                // height of the second shape minus that of the first, along the normal
                 let distance = (q.height(x, y) - height) * self.side;
                 self.write(cx, i, slot, Vec3([x, y, distance]), is);
             }
@@ -166,11 +182,13 @@ impl<F: Num> Clip<F> {
         // corners on an edge are candidates of that edge already
         let inside = c(-1e-6) * self.size;
         times!(cx, i in CORNERS_MAX, {
+            // a corner of the clipping polygon, and the most that it is beyond any edge of the clipped one
             let Vec3([x, y, height]) = load_each3(cx, tables.corners, i, 3);
             let mut outside = cx.var(c(-1e18));
             times!(cx, j in CORNERS_MAX, {
                 let (x0, y0) = (cx.load(tables.corners, j, 0), cx.load(tables.corners, j, 1));
                 let (x1, y1) = (next_corner(cx, tables, j, 0), next_corner(cx, tables, j, 1));
+                // distance beyond the edge: (dy, -dx)/|d| · (x - x0, y - y0), by the orientation of the corners
                 let (dx, dy) = (x1 - x0, y1 - y0);
                 let square = dx.fma(dx, dy * dy);
                 let unit = p.turn.div(square.max(c(1e-24)).sqrt());
@@ -184,6 +202,7 @@ impl<F: Num> Clip<F> {
             // segments have no inside
             let within = cx.get(&outside).lt(inside) & c(2.5).lt(counts[0]);
             let within = within & c(2.5).lt(counts[1]);
+            // as in `clip_edges`, with the roles of the polygons exchanged
             let distance = (height - p.height(x, y)) * self.side;
             self.write(cx, i, 2, Vec3([x, y, distance]), within);
             let done = (counts[1] - c(1.5)).lt(cx.number(i));
@@ -203,6 +222,7 @@ impl<F: Num> Clip<F> {
     ) {
         let t = self.tables.candidates;
         let is = is & distance.lt(self.margin);
+        // every world has the same rows: an empty place is marked by its distance
         cx.store(t, i, 3 * slot, x);
         cx.store(t, i, 3 * slot + 1, y);
         cx.store(
@@ -224,6 +244,7 @@ pub(in crate::step::collide) fn deepest_candidate<C: Cx>(
     distance: C::F,
 ) -> (Vec3<C::F>, MaskOf<C>) {
     let c = C::F::c;
+    // an empty place has the distance NO_CANDIDATE: it is never below the start value
     let mut best = [
         cx.var(c(0.0)),
         cx.var(c(0.0)),
@@ -237,9 +258,11 @@ pub(in crate::step::collide) fn deepest_candidate<C: Cx>(
             let deeper = (x[2] + least).lt(old[2]);
             set3(cx, &mut best, select(deeper, x, old));
         }
+        // candidates have a row per corner of the larger polygon
         let done = (most - c(1.5)).lt(cx.number(i));
         break_if!(cx, done);
     });
+    // the point kept may be one tolerance above the deepest, and rounding adds another
     let x = get3(cx, &best);
     (x, x[2].lt(distance + least + least))
 }
@@ -263,6 +286,7 @@ pub(in crate::step::collide) fn farthest_candidate<C: Cx>(
     times!(cx, i in CORNERS_MAX, {
         for slot in 0..3 {
             let x: Vec3<C::F> = load_each3(cx, tables.candidates, i, 3 * slot);
+            // what the candidate adds; empty places add nothing
             let here = score.at(x[0], x[1]);
             let old = cx.get(&best);
             let farther = old.lt(here) & x[2].lt(c(0.5 * NO_CANDIDATE));

@@ -87,9 +87,11 @@ pub(in crate::step::collide) fn add_manifold<C: Cx, A: Feature<C>, B: Feature<C>
     size: C::F,
     out: &mut Points<C>,
 ) {
+    // the view: u and v across the normal n, heights along n
     let n = near.normal;
     let u = perpendicular(n);
     let view = Mat3([u, n.cross(u), n]);
+    // features that cannot lie flat touch in the closest point alone, as does a pair without candidates
     let mut chosen = Chosen::new(cx, near.distance);
     when!(cx, features.flat, {
         let clip = Clip {
@@ -99,6 +101,7 @@ pub(in crate::step::collide) fn add_manifold<C: Cx, A: Feature<C>, B: Feature<C>
             size,
             margin: pair.margin,
         };
+        // loops end for a world at the corners of its larger polygon
         let most = clip.counts[0].max(clip.counts[1]);
         project(cx, &clip, most, near, features, &view);
         intersect(cx, &clip, features, &view, &mut chosen);
@@ -120,6 +123,7 @@ fn project<C: Cx, A: Feature<C>, B: Feature<C>>(
     let (c, tables) = (C::F::c, clip.tables);
     // one more row than corners: the first corner again, the end of the last edge
     times!(cx, i in CORNERS_MAX + 1, {
+        // corners of both features in the view, from the closest point of the pair
         let p = features.clipped.corner(cx, i);
         let q = features.clipping.corner(cx, i);
         let p = view.transpose_mul(p - near.point);
@@ -130,6 +134,7 @@ fn project<C: Cx, A: Feature<C>, B: Feature<C>>(
         }
         let done = (most - c(0.5)).lt(cx.number(i));
         break_if!(cx, done);
+        // row i has no candidates yet
         for k in 0..3 {
             cx.fill(tables.candidates, i, 3 * k + 2, c(NO_CANDIDATE));
         }
@@ -147,13 +152,16 @@ fn intersect<C: Cx, A: Feature<C>, B: Feature<C>>(
 ) {
     let c = C::F::c;
     let first = cx.at(0);
+    // the planes of both polygons: heights along n as linear functions of x and y
     let p = view.transpose_mul(features.clipped.normal());
     let p = ClipPlane::through(cx, clip.tables, first, 0, p);
     let q = view.transpose_mul(features.clipping.normal());
     let q = ClipPlane::through(cx, clip.tables, first, 3, q);
+    // the clipped feature's plane gives the height of contact points in `add_chosen`
     let surface = Vec3([p.slope[0], p.slope[1], p.base]);
     set3(cx, &mut chosen.surface, surface);
     clip.half_planes(cx, q.turn);
+    // a steep plane leaves no candidates, and the closest point stays alone
     let steep = p.facing.lt(c(FACING)) | q.facing.lt(c(FACING));
     when!(cx, !steep, {
         clip.clip_edges(cx, &q);
@@ -173,10 +181,12 @@ fn reduce<C: Cx>(
     // candidates as deep as the shapes up to rounding are as deep
     let least = rounding_error::<C::F>() * clip.size;
     let (x, deep) = deepest_candidate(cx, clip.tables, most, least, distance);
+    // the deepest candidate replaces the closest point, if it is as deep as the shapes are
     let old = get3(cx, &chosen.spots[0]);
     set3(cx, &mut chosen.spots[0], select(deep, x, old));
     let is_closest = C::F::select(deep, C::F::c(0.0), C::F::c(1.0));
     cx.set(&mut chosen.is_closest, is_closest);
+    // second to fourth point: each adds most to those before, and at least SPREAD of the radius
     for count in 0..3 {
         let spots = [
             get3(cx, &chosen.spots[0]),
@@ -203,19 +213,24 @@ fn add_chosen<C: Cx>(
 ) {
     let c = C::F::c;
     let (Mat3([u, v, n]), frame) = (*view, pair.pose_b);
+    // the normal in the frame of the pair
     let normal = frame.axes * n;
     let slope = get3(cx, &chosen.surface);
     for k in 0..4 {
         let Vec3([x, y, distance]) = get3(cx, &chosen.spots[k]);
+        // rounding of the cut must not make a candidate deeper than the shapes are
         let distance = distance.max(near.distance);
+        // the middle: height of the clipped surface plus half the way to the other, which `side` gives a sign
         let height = slope[0].fma(x, slope[1].fma(y, slope[2])) + distance * side * c(0.5);
         // the closest point is a middle already
         let height = match k {
             0 => C::F::select(c(0.5).lt(cx.get(&chosen.is_closest)), c(0.0), height),
             _ => height,
         };
+        // from the view to the frame of the second shape, then to that of the pair
         let point = u.scale_add(x, v.scale_add(y, n.scale_add(height, near.point)));
         let point = frame.axes.mul_add(point, frame.center);
+        // the first point always exists; of the others those that widened the contact
         let is = match k {
             0 => distance.lt(pair.margin),
             _ => c(0.5).lt(cx.get(&chosen.exists[k - 1])),

@@ -60,6 +60,7 @@ impl<C: Cx> Points<C> {
         distance: C::F,
         normal: Vec3<C::F>,
     ) {
+        // room is counted only where a world can become full; else every point has room
         let mask = if self.room.is_tight {
             self.room.reserve(cx, mask)
         } else {
@@ -67,11 +68,13 @@ impl<C: Cx> Points<C> {
         };
         let (list, table, pair) = (&mut self.list, self.table, self.pair);
         let (along, mu) = (self.along, self.mu);
+        // from the reference point of the rows, with the direction of normals that the rows have
         let (point, normal) = (self.base + point, normal * self.flip);
         push!(cx, *list, mask, fresh, {
             let (Vec3([x, y, z]), Vec3([u, v, w])) = (point, normal);
             // in the order of `row`
             cx.init_all(table, fresh, &[x, y, z, distance, u, v, w, pair]);
+            // optional scalars of the row: friction where it varies, the first tangent where its direction matters
             if let Some(mu) = mu {
                 cx.init(table, fresh, row::MU, mu);
             }
@@ -89,6 +92,7 @@ impl<F: Num> Room<F> {
     #[inline(always)]
     pub(in crate::step::collide) fn leave_out<C: Cx<F = F>>(&self, cx: &mut C, count: F) {
         let left_out = cx.at(self.left_out);
+        // counts are whole: above a half means at least one
         when!(cx, F::c(0.5).lt(count), {
             let more = cx.load(self.counts, left_out, 0) + count;
             cx.store(self.counts, left_out, 0, more);
@@ -101,15 +105,18 @@ impl<F: Num> Room<F> {
         let one = F::c(1.0);
         let (contacts, rows, left_out) =
             (cx.at(self.contacts), cx.at(self.rows), cx.at(self.left_out));
+        // contacts before this one, and constraint rows with those of this one
         let used = cx.load(self.counts, contacts, 0);
         let used_rows = cx.load(self.counts, rows, 0) + self.of_a_contact;
         // counts are whole: half of one keeps the comparison clear of rounding
         let fits =
             (used + F::c(0.5)).lt(self.contacts_max) & used_rows.lt(self.rows_max + F::c(0.5));
+        // a contact takes its place and its constraint rows together, so that none is without rows
         when!(cx, mask & fits, {
             cx.store(self.counts, contacts, 0, used + one);
             cx.store(self.counts, rows, 0, used_rows);
         });
+        // a point without room is counted, not stored: the world then gets a bit in `status`
         when!(cx, mask & !fits, {
             let more = cx.load(self.counts, left_out, 0) + one;
             cx.store(self.counts, left_out, 0, more);

@@ -19,6 +19,7 @@ impl<F: Num> Line<F> {
     #[inline(always)]
     fn through(p: Vec3<F>, q: Vec3<F>) -> Line<F> {
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+        // unit normal to the right of p q: (dy, -dx)/|d|; 0 where the points coincide, since dx and dy are 0 there
         let unit = F::c(1.0).div(dx.fma(dx, dy * dy).max(F::c(1e-24)).sqrt());
         let (a, b) = (dy * unit, -(dx * unit));
         Line {
@@ -59,10 +60,12 @@ impl<F: Num> ReductionScore<F> {
     /// With `count` + 1 of the points chosen.
     #[inline(always)]
     pub fn from_chosen(count: usize, chosen: [Vec3<F>; 3]) -> ReductionScore<F> {
+        // only the first `count` + 1 of the points are read
         let [p, q, r] = chosen;
         match count {
             0 => ReductionScore::Point(p),
             1 => ReductionScore::Segment(Line::through(p, q)),
+            // the sides pq, qr, rp, each with the outside of the triangle beyond it
             _ => {
                 let base = Line::through(p, q);
                 // the third point may lie on either side of the first two
@@ -80,6 +83,7 @@ impl<F: Num> ReductionScore<F> {
     /// The score that a point must exceed to be at least `least` away [m].
     #[inline(always)]
     pub fn threshold(&self, least: F) -> F {
+        // the score of a single point is a squared distance, so its threshold is squared too
         match self {
             ReductionScore::Point(_) => least * least,
             _ => least,
@@ -94,7 +98,9 @@ impl<F: Num> ReductionScore<F> {
                 let (dx, dy) = (x - p[0], y - p[1]);
                 dx.fma(dx, dy * dy)
             }
+            // a point may lie on either side of the line
             ReductionScore::Segment(line) => line.beyond(x, y).abs(),
+            // beyond a triangle: the largest distance beyond any of its sides, negative inside
             ReductionScore::Triangle(sides) => {
                 let (p, q, r) = (
                     sides[0].beyond(x, y),

@@ -3,7 +3,7 @@
 use crate::lane::Num;
 use crate::math::vec3::{Mat3, Vec3};
 
-/// Smaller divisors count as this one, so that a reciprocal stays finite and keeps its sign.
+/// Smaller divisors count as this one, so that a reciprocal stays finite.
 const TINY: f64 = 1e-30;
 
 /// The point of a box with these half extents that is nearest to `x` (Ericson 2005, section 5.1.3).
@@ -55,6 +55,7 @@ pub fn perpendicular<F: Num>(a: Vec3<F>) -> Vec3<F> {
     let flat = F::c(0.6).lt(a[0].abs());
     let zero = F::c(0.0);
     let b = select(flat, Vec3([-a[1], a[0], zero]), Vec3([zero, -a[2], a[1]]));
+    // unit length: a square of at least 0.36 is left, so the division needs no guard
     b * F::c(1.0).div(b.dot(b).sqrt())
 }
 
@@ -62,6 +63,7 @@ pub fn perpendicular<F: Num>(a: Vec3<F>) -> Vec3<F> {
 #[inline(always)]
 pub fn largest_axis<F: Num>(x: Vec3<F>) -> F {
     let (x, y, z) = (x[0].abs(), x[1].abs(), x[2].abs());
+    // of equal sizes the lower index stays
     let second = x.lt(y);
     let third = x.max(y).lt(z);
     F::select(third, F::c(2.0), F::select(second, F::c(1.0), F::c(0.0)))
@@ -70,6 +72,7 @@ pub fn largest_axis<F: Num>(x: Vec3<F>) -> F {
 /// Index and value of the smallest component.
 #[inline(always)]
 pub fn min_component<F: Num>(x: Vec3<F>) -> (F, F) {
+    // of equal components the first stays
     let second = x[1].lt(x[0]);
     let least = F::select(second, x[1], x[0]);
     let third = x[2].lt(least);
@@ -83,6 +86,7 @@ pub fn min_component<F: Num>(x: Vec3<F>) -> (F, F) {
 /// The column with this index.
 #[inline(always)]
 pub fn column_at<F: Num>(index: F, columns: Mat3<F>) -> Vec3<F> {
+    // the index is whole: thresholds half-way between need no comparison for equality
     let (first, second) = (index.lt(F::c(0.5)), index.lt(F::c(1.5)));
     select(first, columns[0], select(second, columns[1], columns[2]))
 }
@@ -90,6 +94,7 @@ pub fn column_at<F: Num>(index: F, columns: Mat3<F>) -> Vec3<F> {
 /// The component with this index.
 #[inline(always)]
 pub fn component_at<F: Num>(index: F, components: Vec3<F>) -> F {
+    // thresholds half-way between whole indices
     let (first, second) = (index.lt(F::c(0.5)), index.lt(F::c(1.5)));
     F::select(
         first,
@@ -101,6 +106,7 @@ pub fn component_at<F: Num>(index: F, components: Vec3<F>) -> F {
 /// `x`, or 0 where `k` is the index.
 #[inline(always)]
 pub fn zero_at<F: Num>(index: F, k: usize, x: F) -> F {
+    // whole scalars are equal where they differ by less than a half
     let is = (index - F::c(k as f64)).abs().lt(F::c(0.5));
     F::select(is, F::c(0.0), x)
 }
@@ -114,6 +120,7 @@ pub fn only_at<F: Num>(index: F, k: usize, x: F) -> F {
 /// Columns in cyclic order, that of the index first.
 #[inline(always)]
 pub fn cycle_columns<F: Num>(index: F, columns: Mat3<F>) -> Mat3<F> {
+    // column k of the result is column (index + k) mod 3
     Mat3([
         column_at(index, columns),
         column_at(index, Mat3([columns[1], columns[2], columns[0]])),
@@ -124,6 +131,7 @@ pub fn cycle_columns<F: Num>(index: F, columns: Mat3<F>) -> Mat3<F> {
 /// Components in cyclic order, that of the index first.
 #[inline(always)]
 pub fn cycle_components<F: Num>(index: F, components: Vec3<F>) -> Vec3<F> {
+    // component k of the result is component (index + k) mod 3
     column_at(
         index,
         Mat3([
@@ -137,6 +145,7 @@ pub fn cycle_components<F: Num>(index: F, components: Vec3<F>) -> Vec3<F> {
 /// 1/x, finite.
 #[inline(always)]
 pub fn reciprocal<F: Num>(x: F) -> F {
+    // a divisor near 0 is replaced, whatever its sign
     let tiny = x.abs().lt(F::c(TINY));
     F::c(1.0).div(F::select(tiny, F::c(TINY), x))
 }
