@@ -67,7 +67,7 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             for &(place, row) in &scan.ground {
                 let solid = &m.contacts.solids[place];
                 let axes = Mat3::constant(solid.axes);
-                let found = match solid.kind {
+                let surface = match solid.kind {
                     Kind::Field => {
                         let at = cx.at(row);
                         let (origin, center) =
@@ -83,7 +83,7 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                         -n.dot(from + way).div(n[2])
                     }
                 };
-                height = height.max(found);
+                height = height.max(surface);
             }
             *ray = (-height).min(C::F::k(scan.reach));
         }

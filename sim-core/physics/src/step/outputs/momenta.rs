@@ -41,11 +41,11 @@ impl Stage for Momenta {
         let bodies = &m.outputs.bodies;
         // momenta, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
-            let own = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));
+            let twist = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));
             b.work.subtree_linvel[k] =
-                own[LINEAR] * masses::mass(m, &b.params, body.link, body.mass);
+                twist[LINEAR] * masses::mass(m, &b.params, body.link, body.mass);
             // the spin itself turns the body about its centre of mass
-            b.work.subtree_angmom[k] = masses::inertia_times(m, b, body, own[ANGULAR]);
+            b.work.subtree_angmom[k] = masses::inertia_times(m, b, body, twist[ANGULAR]);
         }
         for (k, body) in bodies.iter().enumerate().rev() {
             let momentum = b.work.subtree_linvel[k];
@@ -57,13 +57,13 @@ impl Stage for Momenta {
             b.work.subtree_linvel[k] = momentum * C::F::c(1.0).div(whole);
         }
         for (k, body) in bodies.iter().enumerate().rev() {
-            let own = position(&b.work, &body.inertial);
-            let moving = velocity(&b.work, &body.inertial, own)[LINEAR];
+            let point = position(&b.work, &body.inertial);
+            let moving = velocity(&b.work, &body.inertial, point)[LINEAR];
             let mass = masses::mass(m, &b.params, body.link, body.mass);
             let w = &mut b.work;
             let (center, carried) = (w.subtree_center[k], w.subtree_linvel[k]);
-            let own = (own - center).cross((moving - carried) * mass);
-            w.subtree_angmom[k] = w.subtree_angmom[k] + own;
+            let orbital = (point - center).cross((moving - carried) * mass);
+            w.subtree_angmom[k] = w.subtree_angmom[k] + orbital;
             let parent = body.parent;
             if parent != k {
                 let mut apart = center - w.subtree_center[parent];

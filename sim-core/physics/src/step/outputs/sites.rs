@@ -121,10 +121,10 @@ fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
 /// Position of a mount, from the reference point of its robot.
 #[inline(always)]
 pub fn position<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
-    let own = Vec3::constant(mount.position);
+    let local = Vec3::constant(mount.position);
     match mount.body {
-        Some(body) => w.rotation[body].mul_add(own, w.origin[body]),
-        None => own,
+        Some(body) => w.rotation[body].mul_add(local, w.origin[body]),
+        None => local,
     }
 }
 
@@ -140,10 +140,10 @@ pub fn reference<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Vec3<F> {
 /// Orientation of a mount in the world.
 #[inline(always)]
 pub(in crate::step) fn orientation<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Quat<F> {
-    let own = quat::constant(mount.quat);
+    let local = quat::constant(mount.quat);
     match mount.body {
-        Some(body) => mul(w.orientation[body], own),
-        None => own,
+        Some(body) => mul(w.orientation[body], local),
+        None => local,
     }
 }
 
@@ -166,13 +166,13 @@ pub(in crate::step) fn velocity<F: Num>(
 /// Axes of a mount in the world, by columns.
 #[inline(always)]
 pub fn axes<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Mat3<F> {
-    let own = Mat3::constant(mount.rotation);
+    let local = Mat3::constant(mount.rotation);
     match mount.body {
         Some(body) => {
             let carrier = &w.rotation[body];
-            Mat3([carrier * own[0], carrier * own[1], carrier * own[2]])
+            Mat3([carrier * local[0], carrier * local[1], carrier * local[2]])
         }
-        None => own,
+        None => local,
     }
 }
 
@@ -183,9 +183,9 @@ pub(in crate::step) fn to_local<F: Num>(
     mount: &Mount<F::Real>,
     vector: Vec3<F>,
 ) -> Vec3<F> {
-    let own = Mat3::constant(mount.rotation);
+    let local = Mat3::constant(mount.rotation);
     match mount.body {
-        Some(body) => own.transpose_mul(w.rotation[body].transpose_mul(vector)),
-        None => own.transpose_mul(vector),
+        Some(body) => local.transpose_mul(w.rotation[body].transpose_mul(vector)),
+        None => local.transpose_mul(vector),
     }
 }

@@ -42,11 +42,12 @@ impl Stage for Subtrees {
         let w = &mut b.work;
         for (k, body) in bodies.iter().enumerate().rev() {
             let (moment, mass) = (w.subtree_center[k], w.subtree_mass[k]);
-            let own = position(w, &body.inertial);
+            let body_center = position(w, &body.inertial);
             let is_light = mass.lt(C::F::c(MASS_MIN));
             let inverse = C::F::c(1.0).div(mass.max(C::F::c(MASS_MIN)));
             for i in 0..3 {
-                w.subtree_center[k][i] = C::F::select(is_light, own[i], moment[i] * inverse);
+                w.subtree_center[k][i] =
+                    C::F::select(is_light, body_center[i], moment[i] * inverse);
             }
             w.subtree_com[k] = w.subtree_center[k] + reference(w, &body.frame);
             if body.parent != k {

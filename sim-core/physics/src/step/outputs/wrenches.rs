@@ -87,8 +87,8 @@ impl Stage for Forces {
         }
         for (k, body) in bodies.iter().enumerate().rev() {
             if body.parent != k {
-                let own = w.cfrc_int[k];
-                for (sum, x) in w.cfrc_int[body.parent].iter_mut().zip(own) {
+                let wrench = w.cfrc_int[k];
+                for (sum, x) in w.cfrc_int[body.parent].iter_mut().zip(wrench) {
                     *sum = *sum + x;
                 }
             }
@@ -108,8 +108,8 @@ fn accelerate<F: Num, V>(
     let center = root_center(m, b, body);
     let mass = masses::mass(m, &b.params, body.link, body.mass);
     let w = &mut b.work;
-    let own = position(w, &body.inertial);
-    let (at_center, at_own, alpha, omega) = match body.frame.body {
+    let point = position(w, &body.inertial);
+    let (at_center, at_point, alpha, omega) = match body.frame.body {
         Some(carrier) => {
             let Spatial([linear, omega]) = w.velocity[carrier];
             let (origin, acceleration) = (w.origin[carrier], w.force[carrier]);
@@ -117,7 +117,7 @@ fn accelerate<F: Num, V>(
             let velocity = omega.cross_add(center, linear);
             (
                 classical - omega.cross(velocity),
-                point_acceleration(acceleration, omega, own - origin),
+                point_acceleration(acceleration, omega, point - origin),
                 acceleration[ANGULAR],
                 omega,
             )
@@ -125,10 +125,10 @@ fn accelerate<F: Num, V>(
         None => (base, base, Vec3::zero(), Vec3::zero()),
     };
     w.cacc[k] = six(alpha, at_center);
-    let force = at_own * mass;
+    let force = at_point * mass;
     let times = |v| masses::inertia_times(m, b, body, v);
     let moment = omega.cross_add(times(omega), times(alpha));
-    b.work.cfrc_int[k] = six(moment + (own - center).cross(force), force);
+    b.work.cfrc_int[k] = six(moment + (point - center).cross(force), force);
 }
 
 /// Angular, then linear part.
@@ -244,9 +244,9 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
         let pair = cx.load(rows, r, row::PAIR);
         let twist = cx.pick(t.turning, pair, 0);
         let roll = cx.pick(t.turning, pair, 1);
-        let own = load_vec3(cx, rows, r, block + turning::FORCE);
+        let scaled = load_vec3(cx, rows, r, block + turning::FORCE);
         torque = frame.mul_add(
-            Vec3([own[0] * twist, own[1] * roll, own[2] * roll]),
+            Vec3([scaled[0] * twist, scaled[1] * roll, scaled[2] * roll]),
             Vec3::zero(),
         );
     }

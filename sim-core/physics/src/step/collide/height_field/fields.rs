@@ -131,11 +131,11 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         frame.transpose_mul(origin),
         frame.transpose_mul(center),
     );
-    let own = axes_of(cx, poses, b);
+    let shape_axes = axes_of(cx, poses, b);
     let axes = Mat3([
-        frame.transpose_mul(own[0]),
-        frame.transpose_mul(own[1]),
-        frame.transpose_mul(own[2]),
+        frame.transpose_mul(shape_axes[0]),
+        frame.transpose_mul(shape_axes[1]),
+        frame.transpose_mul(shape_axes[2]),
     ]);
     let shape = Shape::read(cx, t, N::KIND, p, pair::SIZE_B, pair::HULL_B);
     let size = cx.constant(scalars, p, pair::SMALLER);
@@ -168,7 +168,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             two_point_capsule_boxes: false,
         };
         let mut out = points_of::<C>(cx, t, p, center, origin);
-        let mut found = candidates(cx, t.memory.field_candidates, &out);
+        let mut candidate_points = candidates(cx, t.memory.field_candidates, &out);
         let body = Body {
             size: shapes.a.half_extents(),
             axes: &axes,
@@ -181,13 +181,13 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         each!(cx, at in listed, {
             let number = cx.load(table, at, 0);
             let prism = samples.prism(cx, &cells, number, size);
-            N::contacts(cx, &shapes, &axes, &prism, &mut found);
+            N::contacts(cx, &shapes, &axes, &prism, &mut candidate_points);
         });
         let (none, full) = (C::F::c(0.0), C::F::c(FIELD_CANDIDATES as f64));
         let prisms = (cx.pushed(&listed) - full).max(none);
-        let over = prisms + (cx.pushed(&found.list) - full).max(none);
+        let over = prisms + (cx.pushed(&candidate_points.list) - full).max(none);
         out.room.leave_out(cx, over);
-        keep(cx, &found, size, &mut out);
+        keep(cx, &candidate_points, size, &mut out);
     });
 }
 
@@ -253,21 +253,23 @@ fn candidates<C: Cx>(cx: &mut C, table: Table, out: &Points<C>) -> Points<C> {
 
 /// Adds the candidates, or those that span most of them where they are too many.
 #[inline(always)]
-fn keep<C: Cx>(cx: &mut C, found: &Points<C>, size: C::F, out: &mut Points<C>) {
+fn keep<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Points<C>) {
     let c = C::F::c;
     // candidates have place and normal as rows have them
     out.base = Vec3::zero();
     out.flip = c(1.0);
-    let few = cx.pushed(&found.list).lt(c(FIELD_CONTACTS as f64 + 0.5));
-    let table = found.table;
+    let few = cx
+        .pushed(&candidates.list)
+        .lt(c(FIELD_CONTACTS as f64 + 0.5));
+    let table = candidates.table;
     when!(cx, few, {
-        each!(cx, at in found.list, {
+        each!(cx, at in candidates.list, {
             let contact = Candidate::read(cx, table, at);
             contact.add(cx, few, out);
         });
     });
     when!(cx, !few, {
-        keep_some(cx, found, size, out);
+        keep_some(cx, candidates, size, out);
     });
 }
 
@@ -339,12 +341,12 @@ impl<C: Cx> Best<C> {
 
 /// Adds the deepest candidate, then again and again the one that is farthest from those added, in place and normal.
 #[inline(always)]
-fn keep_some<C: Cx>(cx: &mut C, found: &Points<C>, size: C::F, out: &mut Points<C>) {
-    let (c, table) = (C::F::c, found.table);
+fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Points<C>) {
+    let (c, table) = (C::F::c, candidates.table);
     let scale = c(1.0).div(size * size);
     let inverse = c(1.0).div(size);
     let mut best = Best::none(cx);
-    each!(cx, at in found.list, {
+    each!(cx, at in candidates.list, {
         let contact = Candidate::read(cx, table, at);
         let score = c(FIRST) - contact.distance * inverse;
         cx.store(table, at, SCORE, score);
@@ -358,7 +360,7 @@ fn keep_some<C: Cx>(cx: &mut C, found: &Points<C>, size: C::F, out: &mut Points<
         let is = is & !done;
         break_if!(cx, !is);
         cx.set(&mut best.score, c(SPREAD));
-        each!(cx, at in found.list, {
+        each!(cx, at in candidates.list, {
             let other = Candidate::read(cx, table, at);
             let (way, turn) = (other.place - kept.place, other.normal - kept.normal);
             let apart = way.dot(way).fma(scale, turn.dot(turn));

@@ -35,7 +35,7 @@ pub struct FacePair<F> {
 impl<F: Num> FacePair<F> {
     /// The faces of the best face axis.
     #[inline(always)]
-    pub fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>, best: &BoxAxis<F>) -> FacePair<F> {
+    pub fn from_axis<C: Cx<F = F>>(pair: &ShapePair<'_, C>, best: &BoxAxis<F>) -> FacePair<F> {
         let (axes_a, b) = (pair.axes_a, pair.pose_b);
         let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
         // cosines, centre and sizes as the box of the reference face has them

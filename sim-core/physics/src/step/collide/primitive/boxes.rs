@@ -64,15 +64,15 @@ fn size<F: Num>(a: Vec3<F>, b: Vec3<F>) -> F {
 #[inline(always)]
 pub fn box_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (half_a, half_b, margin) = (pair.a.half_extents(), pair.b.half_extents(), pair.margin);
-    let faces = FaceAxis::of(pair);
+    let faces = FaceAxis::find(pair);
     when!(cx, !margin.lt(faces.separation), {
-        let edge = EdgeAxis::of(&faces, half_a, half_b);
+        let edge = EdgeAxis::find(&faces, half_a, half_b);
         // separation × √square against the margin, both squared
         let far = (margin * margin * edge.square).lt(edge.score);
         when!(cx, !far, {
             let best = best_axis(&faces, &edge, half_a, half_b);
             when!(cx, !best.edge, {
-                FacePair::of(pair, &best).add_clipped(cx, margin, out);
+                FacePair::from_axis(pair, &best).add_clipped(cx, margin, out);
             });
             when!(cx, best.edge, {
                 add_edge_contact(cx, pair, &best, out);
@@ -96,7 +96,7 @@ struct FaceAxis<F> {
 impl<F: Num> FaceAxis<F> {
     /// Finds it: the first of A's, unless one of B's is larger by more than rounding.
     #[inline(always)]
-    fn of<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> FaceAxis<F> {
+    fn find<C: Cx<F = F>>(pair: &ShapePair<'_, C>) -> FaceAxis<F> {
         let c = F::c;
         let (axes_a, b) = (pair.axes_a, pair.pose_b);
         let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
@@ -151,7 +151,7 @@ struct EdgeAxis<F> {
 impl<F: Num> EdgeAxis<F> {
     /// Finds it.
     #[inline(always)]
-    fn of(faces: &FaceAxis<F>, half_a: Vec3<F>, half_b: Vec3<F>) -> EdgeAxis<F> {
+    fn find(faces: &FaceAxis<F>, half_a: Vec3<F>, half_b: Vec3<F>) -> EdgeAxis<F> {
         let c = F::c;
         let (cosines, widths, in_a) = (&faces.cosines, &faces.widths, faces.center[0]);
         // separation x over length √l is compared by x|x| l' > x'|x'| l

@@ -262,19 +262,19 @@ impl<F: Num> Beside<F> {
         let width = two * component_at(longest, widths);
         let from_edge = up * up.fnma(nearest.height, one).min(width).min(to_end);
 
-        // over a corner: the axis of one's own is that whose side is unlike those of both others
+        // over a corner: the odd axis is that whose side is unlike those of both others
         let mut others = widths;
-        let mut own = zero;
+        let mut odd = zero;
         for k in 0..3 {
-            let is_own = F::select(single, inward[k], one - inward[k]);
-            own = is_own.fma(F::c(k as f64), own);
-            others[k] = F::select(F::c(0.5).lt(is_own), F::c(FAR), widths[k]);
+            let is_odd = F::select(single, inward[k], one - inward[k]);
+            odd = is_odd.fma(F::c(k as f64), odd);
+            others[k] = F::select(F::c(0.5).lt(is_odd), F::c(FAR), widths[k]);
         }
         let up = F::select(single, one, -one);
-        let steep = component_at(own, h);
+        let steep = component_at(odd, h);
         let along_edge = h.dot(h).lt(two * steep * steep);
         let (_, width) = min_component(others);
-        let width = two * F::select(along_edge, component_at(own, widths), width);
+        let width = two * F::select(along_edge, component_at(odd, widths), width);
         let up = F::select(along_edge, up, -up);
         let from_corner = up * up.fnma(nearest.height, one).min(width);
 

@@ -146,12 +146,12 @@ fn touched<C: Cx>(
     for &class in &touch.classes {
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
-            let own = contact(cx, m, b, (class, touch.column), r);
-            let point = in_zone(b, &touch.zone, own.point);
-            let outwards = to_local(&b.work, &touch.zone.site, own.frame[0] * own.sense);
-            let normal = own.force[0];
+            let contact = contact(cx, m, b, (class, touch.column), r);
+            let point = in_zone(b, &touch.zone, contact.point);
+            let outwards = to_local(&b.work, &touch.zone.site, contact.frame[0] * contact.sense);
+            let normal = contact.force[0];
             let counts: MaskOf<C> = zero.lt(normal)
-                & zero.lt(own.sense.abs())
+                & zero.lt(contact.sense.abs())
                 & meets(&touch.zone, point, outwards);
             let more = cx.get(&sum) + C::F::select(counts, normal, zero);
             cx.set(&mut sum, more);
@@ -167,7 +167,7 @@ fn turn<F: Num, V>(
     b: &crate::arrays::Block<F, V>,
     sensor: &ContactSensor<F::Real>,
     pair: F,
-    own: &mut Contact<F>,
+    contact: &mut Contact<F>,
 ) {
     let mut along = None;
     for &(number, solid) in &sensor.capsules {
@@ -185,13 +185,13 @@ fn turn<F: Num, V>(
             F::select(is_it, axis[2], before[2]),
         ]));
     }
-    let normal = own.frame[0];
+    let normal = contact.frame[0];
     let [first, second] = tangents(normal, along);
     let frame = Mat3([normal, first, second]);
-    [own.force, own.torque] = map([own.force, own.torque], |v| {
-        frame.transpose_mul(own.frame.mul_add(v, Vec3::zero()))
+    [contact.force, contact.torque] = map([contact.force, contact.torque], |v| {
+        frame.transpose_mul(contact.frame.mul_add(v, Vec3::zero()))
     });
-    own.frame = frame;
+    contact.frame = frame;
 }
 
 /// The worlds in which a contact is one of a sensor's.
@@ -199,28 +199,28 @@ fn turn<F: Num, V>(
 fn matches<C: Cx>(
     b: &BlockOf<C>,
     sensor: &ContactSensor<<C::F as Num>::Real>,
-    own: &Contact<C::F>,
+    contact: &Contact<C::F>,
 ) -> MaskOf<C> {
-    let is_of = C::F::c(0.5).lt(own.sense.abs());
+    let is_of = C::F::c(0.5).lt(contact.sense.abs());
     match &sensor.zone {
-        Some(zone) => is_of & holds(zone, in_zone(b, zone, own.point)),
+        Some(zone) => is_of & holds(zone, in_zone(b, zone, contact.point)),
         None => is_of,
     }
 }
 
 /// The record of a contact.
 #[inline(always)]
-fn record<F: Num>(own: &Contact<F>) -> [F; RECORD] {
-    let (s, e) = (own.order, own.sense);
+fn record<F: Num>(contact: &Contact<F>) -> [F; RECORD] {
+    let (s, e) = (contact.order, contact.sense);
     let d = s * e;
     let seen = |v: Vec3<F>| Vec3([v[0], v[1] * s, v[2] * d]);
-    let mut all = [own.distance; RECORD];
+    let mut all = [contact.distance; RECORD];
     let parts = [
-        (0, seen(own.force)),
-        (3, seen(own.torque)),
-        (7, own.point),
-        (10, own.frame[0] * e),
-        (13, own.frame[1] * d),
+        (0, seen(contact.force)),
+        (3, seen(contact.torque)),
+        (7, contact.point),
+        (10, contact.frame[0] * e),
+        (13, contact.frame[1] * d),
     ];
     for (first, part) in parts {
         all[first..first + 3].copy_from_slice(&part.0);
@@ -235,30 +235,30 @@ fn records<C: Cx>(
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     sensor: &Sensor<<C::F as Num>::Real>,
-    own: &ContactSensor<<C::F as Num>::Real>,
+    contact_sensor: &ContactSensor<<C::F as Num>::Real>,
 ) {
     let zero = C::F::c(0.0);
-    let mut found = cx.var(zero);
+    let mut total = cx.var(zero);
     for slot in 0..own.records {
         for k in 0..SLOT {
             let start = if k == RECORD { C::F::c(EMPTY) } else { zero };
             cx.set(&mut b.contact_records[slot * SLOT + k], start);
         }
     }
-    for &class in &own.classes {
+    for &class in &contact_sensor.classes {
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
-            let mut contact = contact(cx, m, b, (class, own.column), r);
+            let mut contact = contact(cx, m, b, (class, contact_sensor.column), r);
             let pair = cx.load(m.contacts.memory.rows, r, row::PAIR);
-            turn(m, b, own, pair, &mut contact);
-            let is_found = matches::<C>(b, own, &contact);
-            let key = match own.reduction {
+            turn(m, b, contact_sensor, pair, &mut contact);
+            let is_found = matches::<C>(b, contact_sensor, &contact);
+            let key = match contact_sensor.reduction {
                 Reduction::LeastDistance => contact.distance,
                 Reduction::LargestForce => -contact.force.dot(contact.force),
-                Reduction::First | Reduction::NetForce => cx.get(&found),
+                Reduction::First | Reduction::NetForce => cx.get(&total),
             };
-            let more = cx.get(&found) + C::F::select(is_found, C::F::c(1.0), zero);
-            cx.set(&mut found, more);
+            let more = cx.get(&total) + C::F::select(is_found, C::F::c(1.0), zero);
+            cx.set(&mut total, more);
             let mut carried = [C::F::select(is_found, key, C::F::c(EMPTY)); SLOT];
             carried[..RECORD].copy_from_slice(&record(&contact));
             // insertion: what a slot loses goes on to the next one
@@ -274,14 +274,21 @@ fn records<C: Cx>(
             }
         });
     }
-    let found = cx.get(&found);
+    let total = cx.get(&total);
     for slot in 0..own.records {
-        let is_there = C::F::c(slot as f64 + 0.5).lt(found);
+        let is_there = C::F::c(slot as f64 + 0.5).lt(total);
         let kept: [C::F; RECORD] =
             std::array::from_fn(|k| cx.get(&b.contact_records[slot * SLOT + k]));
         let shown = map(kept, |x| C::F::select(is_there, x, zero));
-        let count = C::F::select(is_there, found, zero);
-        show(&mut b.work.sensordata, sensor, own, slot, count, &shown);
+        let count = C::F::select(is_there, total, zero);
+        show(
+            &mut b.work.sensordata,
+            sensor,
+            contact_sensor,
+            slot,
+            count,
+            &shown,
+        );
     }
 }
 
@@ -290,7 +297,7 @@ fn records<C: Cx>(
 fn show<F: Num>(
     data: &mut [F],
     sensor: &Sensor<F::Real>,
-    own: &ContactSensor<F::Real>,
+    contact_sensor: &ContactSensor<F::Real>,
     slot: usize,
     count: F,
     record: &[F; RECORD],
@@ -298,12 +305,12 @@ fn show<F: Num>(
     let sizes = [1, 3, 3, 1, 3, 3, 3];
     let width: usize = sizes
         .iter()
-        .zip(own.shows)
+        .zip(contact_sensor.shows)
         .map(|(size, shows)| size * usize::from(shows))
         .sum();
     let (mut place, mut first) = (sensor.first + slot * width, 0);
-    for (part, (size, shows)) in sizes.into_iter().zip(own.shows).enumerate() {
-        let own = match part {
+    for (part, (size, shows)) in sizes.into_iter().zip(contact_sensor.shows).enumerate() {
+        let scalars = match part {
             0 => std::slice::from_ref(&count),
             _ => &record[first..first + size],
         };
@@ -311,7 +318,7 @@ fn show<F: Num>(
             first += size;
         }
         if shows {
-            put_at(data, place, sensor.cutoff.as_ref(), own);
+            put_at(data, place, sensor.cutoff.as_ref(), scalars);
             place += size;
         }
     }
@@ -324,16 +331,16 @@ fn net_force<C: Cx>(
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     sensor: &Sensor<<C::F as Num>::Real>,
-    own: &ContactSensor<<C::F as Num>::Real>,
+    contact_sensor: &ContactSensor<<C::F as Num>::Real>,
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     // count, sum of forces, weight, force, torque about the world's origin, weighted point
     let mut sums: [C::V; 11] = std::array::from_fn(|_| cx.var(zero));
-    for &class in &own.classes {
+    for &class in &contact_sensor.classes {
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
-            let contact = contact(cx, m, b, (class, own.column), r);
-            let is_found = matches::<C>(b, own, &contact);
+            let contact = contact(cx, m, b, (class, contact_sensor.column), r);
+            let is_found = matches::<C>(b, contact_sensor, &contact);
             let [force, torque] = map([contact.force, contact.torque], |v| {
                 contact.frame.mul_add(v, Vec3::zero()) * contact.sense
             });
@@ -370,5 +377,12 @@ fn net_force<C: Cx>(
         record[first..first + 3].copy_from_slice(&part.0);
     }
     let record = map(record, |x| C::F::select(is_there, x, zero));
-    show(&mut b.work.sensordata, sensor, own, 0, sums[0], &record);
+    show(
+        &mut b.work.sensordata,
+        sensor,
+        contact_sensor,
+        0,
+        sums[0],
+        &record,
+    );
 }

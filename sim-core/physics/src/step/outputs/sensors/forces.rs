@@ -41,21 +41,21 @@ impl Stage for Accelerations {
         proper_accelerations(cx, m, b);
         let w = &mut b.work;
         for sensor in &m.sensors.all {
-            let SensorKind::Acceleration(own) = &sensor.kind else {
+            let SensorKind::Acceleration(frame) = &sensor.kind else {
                 continue;
             };
-            let Spatial([linear, angular]) = match own.of.body {
+            let Spatial([linear, angular]) = match frame.of.body {
                 Some(body) => {
-                    let arm = w.rotation[body] * Vec3::constant(own.of.position);
+                    let arm = w.rotation[body] * Vec3::constant(frame.of.position);
                     let at = point_acceleration(w.force[body], w.velocity[body][ANGULAR], arm);
                     Spatial([at, w.force[body][ANGULAR]])
                 }
                 // as in MuJoCo, what stands still does not feel gravity
                 None => Spatial::zero(),
             };
-            let mut vector = if own.is_angular { angular } else { linear };
-            if own.is_local {
-                vector = to_local(w, &own.of, vector);
+            let mut vector = if frame.is_angular { angular } else { linear };
+            if frame.is_local {
+                vector = to_local(w, &frame.of, vector);
             }
             put(&mut w.sensordata, sensor, &vector.0);
         }
@@ -83,20 +83,20 @@ impl Stage for Wrenches {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for sensor in &m.sensors.all {
-            let SensorKind::Wrench(own) = &sensor.kind else {
+            let SensorKind::Wrench(wrench) = &sensor.kind else {
                 continue;
             };
-            let [x, y, z, u, v, w] = b.work.cfrc_int[own.body];
+            let [x, y, z, u, v, w] = b.work.cfrc_int[wrench.body];
             let (torque, force) = (Vec3([x, y, z]), Vec3([u, v, w]));
             // the torque about the site
-            let body = &m.outputs.bodies[own.body];
-            let arm = position(&b.work, &own.site) - root_center(m, b, body);
-            let vector = if own.is_torque {
+            let body = &m.outputs.bodies[wrench.body];
+            let arm = position(&b.work, &wrench.site) - root_center(m, b, body);
+            let vector = if wrench.is_torque {
                 torque - arm.cross(force)
             } else {
                 force
             };
-            let local = to_local(&b.work, &own.site, vector);
+            let local = to_local(&b.work, &wrench.site, vector);
             put(&mut b.work.sensordata, sensor, &local.0);
         }
     }
@@ -169,7 +169,7 @@ fn dof_limit<C: Cx>(
             continue;
         }
         let side = b.work.limit_side[k];
-        let own = match part {
+        let property = match part {
             LimitPart::Position => {
                 let q = cx.get(&b.joint_q[m.dofs[dof].coord]);
                 (q - C::F::k(limit.lower)).min(C::F::k(limit.upper) - q)
@@ -178,7 +178,7 @@ fn dof_limit<C: Cx>(
             LimitPart::Force => cx.get(&b.efc_force[first + k]),
         };
         let acts = C::F::c(0.0).lt(cx.get(&b.efc_weight[first + k]));
-        value = C::F::select(acts, own, value);
+        value = C::F::select(acts, property, value);
     }
     value
 }
@@ -196,7 +196,7 @@ fn tie_limit<C: Cx>(
     for &tie in ties.iter().rev() {
         let row = m.joint_rows() + rows_before(&m.ties[..tie]);
         let tie = &m.ties[tie];
-        let own = match part {
+        let property = match part {
             LimitPart::Position => {
                 let position = measured(cx, m, b, tie);
                 match tie.law {
@@ -216,7 +216,7 @@ fn tie_limit<C: Cx>(
             LimitPart::Force => cx.get(&b.efc_force[row]),
         };
         let acts = C::F::c(0.0).lt(cx.get(&b.efc_weight[row]));
-        value = C::F::select(acts, own, value);
+        value = C::F::select(acts, property, value);
     }
     value
 }

@@ -40,10 +40,10 @@ impl Stage for Rays {
             };
             let mut nearest = none;
             for &geom in geoms {
-                let found = seen(&b.work, site, &m.sensors.geoms[geom]);
-                let is_nearer = found.lt(nearest) | nearest.lt(zero);
-                let is_met = !found.lt(zero);
-                nearest = C::F::select(is_met & is_nearer, found, nearest);
+                let range = seen(&b.work, site, &m.sensors.geoms[geom]);
+                let is_nearer = range.lt(nearest) | nearest.lt(zero);
+                let is_met = !range.lt(zero);
+                nearest = C::F::select(is_met & is_nearer, range, nearest);
             }
             put(&mut b.work.sensordata, sensor, &[nearest]);
         }
@@ -70,14 +70,14 @@ fn seen<F: Num>(w: &Workspace<F>, site: &Mount<F::Real>, geom: &RayGeom<F::Real>
 fn to_plane<F: Num>(size: [F::Real; 3], point: Vec3<F>, along: Vec3<F>) -> F {
     let (zero, none) = (F::c(0.0), F::c(-1.0));
     let comes = along[2].lt(F::c(-PARALLEL));
-    let found = (-point[2]).div(F::select(comes, along[2], none));
-    let mut is_met = comes & !found.lt(zero);
+    let range = (-point[2]).div(F::select(comes, along[2], none));
+    let mut is_met = comes & !range.lt(zero);
     for i in 0..2 {
         // a plane without bounds has size 0
         if size[i].to_f64() > 0.0 {
-            let there = along[i].fma(found, point[i]);
+            let there = along[i].fma(range, point[i]);
             is_met = is_met & !F::k(size[i]).lt(there.abs());
         }
     }
-    F::select(is_met, found, none)
+    F::select(is_met, range, none)
 }

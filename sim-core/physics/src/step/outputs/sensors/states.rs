@@ -98,10 +98,10 @@ fn rate<C: Cx>(cx: &mut C, b: &BlockOf<C>, terms: &[Term<<C::F as Num>::Real>]) 
 /// Orientation of a frame, (w, x, y, z).
 #[inline(always)]
 fn quat<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> [F; 4] {
-    let own = orientation(w, &frame.of);
+    let world_quat = orientation(w, &frame.of);
     let [x, y, z, real] = match &frame.from {
-        Some(from) => mul(conjugate(orientation(w, from)), own),
-        None => own,
+        Some(from) => mul(conjugate(orientation(w, from)), world_quat),
+        None => world_quat,
     };
     [real, x, y, z]
 }
@@ -118,21 +118,21 @@ fn property<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> Vec3<F> {
         },
         FramePart::Axis(k) => axes(w, of)[k],
         FramePart::Velocity => {
-            let own = velocity(w, of, place)[LINEAR];
+            let linear = velocity(w, of, place)[LINEAR];
             match from {
                 Some(from) => {
                     let there = velocity(w, from, position(w, from));
                     let carried = there[ANGULAR].cross_add(from_there(w, of, from), there[LINEAR]);
-                    own - carried
+                    linear - carried
                 }
-                None => own,
+                None => linear,
             }
         }
         FramePart::Spin | FramePart::Quat => {
-            let own = velocity(w, of, place)[ANGULAR];
+            let spin = velocity(w, of, place)[ANGULAR];
             match from {
-                Some(from) => own - velocity(w, from, position(w, from))[ANGULAR],
-                None => own,
+                Some(from) => spin - velocity(w, from, position(w, from))[ANGULAR],
+                None => spin,
             }
         }
     };
