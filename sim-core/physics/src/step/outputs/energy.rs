@@ -32,6 +32,7 @@ impl Stage for Energy {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let gravity = gravity(m, &b.params);
         let (w, zero) = (&mut b.work, C::F::c(0.0));
+        // E_kin = ½ q̇ᵀ (M q̇), with q̇ in `start` and M q̇ in `joint_force`
         for (x, qd) in w.start.iter_mut().zip(&b.joint_qd) {
             *x = cx.get(qd);
         }
@@ -42,6 +43,7 @@ impl Stage for Energy {
         }
         w.kinetic_energy[0] = kinetic * C::F::c(0.5);
 
+        // -g · Σ m c from the roots alone: h + m point is the first moment of all bodies below, about the origin
         let mut potential = zero;
         for (k, body) in m.bodies.iter().enumerate() {
             if body.parent.is_none() {
@@ -51,16 +53,19 @@ impl Stage for Energy {
                 potential = potential - gravity.dot(moment);
             }
         }
+        // ½ k (q - rest)² of springs of joints
         for spring in &m.springs.joints {
             let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
             let half = C::F::c(0.5 * spring.stiffness.to_f64());
             potential = (stretch * half).fma(stretch, potential);
         }
+        // ½ k x² of tendons, with x the length outside of their two rests
         for tendon in &m.springs.tendons {
             let stretch = stretch(cx, m, b, tendon);
             let half = C::F::c(0.5 * tendon.stiffness.to_f64());
             potential = (stretch * half).fma(stretch, potential);
         }
+        // ½ k |x|² of balls and free joints, of the displacement and of the rotation vector
         for spring in &m.springs.poses {
             let half = C::F::c(0.5 * spring.stiffness.to_f64());
             for stretch in pose_stretch(cx, m, b, spring) {

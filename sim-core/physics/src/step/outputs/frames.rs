@@ -30,6 +30,7 @@ impl Stage for Bodies {
         let w = &mut b.work;
         for (k, body) in m.outputs.bodies.iter().enumerate() {
             w.xpos[k] = in_world(w, &body.frame);
+            // (w, x, y, z) as in MuJoCo
             let [x, y, z, real] = orientation(w, &body.frame);
             w.xquat[k] = [real, x, y, z];
             w.xmat[k] = rows(&axes(w, &body.frame));
@@ -90,6 +91,7 @@ pub(in crate::step) fn in_world<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>
 /// A matrix row by row.
 #[inline(always)]
 pub(in crate::step) fn rows<F: Num>(matrix: &Mat3<F>) -> [F; 9] {
+    // a Mat3 has its columns one after the other
     let Mat3([Vec3(x), Vec3(y), Vec3(z)]) = *matrix;
     [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]]
 }

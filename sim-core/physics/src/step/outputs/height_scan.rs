@@ -43,10 +43,12 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let c = C::F::c;
     for scan in &m.scans {
         let mount = &scan.mount;
+        // p in two parts, reference point and the way from it, so that `f32` keeps the digits of their differences
         let (origin, center) = (
             sites::reference(&b.work, mount),
             sites::position(&b.work, mount),
         );
+        // cos and sin of the yaw, from the part of the x axis on the level; the yaw of a vertical x axis is 0
         let forward = sites::axes(&b.work, mount)[0];
         let square = forward[0].fma(forward[0], forward[1] * forward[1]);
         let is_level = c(LEVEL * LEVEL).lt(square);
@@ -55,12 +57,14 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             C::F::select(is_level, forward[0] * unit, c(1.0)),
             C::F::select(is_level, forward[1] * unit, c(0.0)),
         );
+        // rays count from the middle of the grid, along x first
         let middle = scan.counts.map(|count| 0.5 * (count as f64 - 1.0));
         let rays = &mut b.work.height_scan[scan.first..scan.first + scan.rays()];
         for (k, ray) in rays.iter_mut().enumerate() {
             let (i, j) = (k % scan.counts[0], k / scan.counts[0]);
             let x = c(i as f64 - middle[0]) * C::F::k(scan.spacing[0]);
             let y = c(j as f64 - middle[1]) * C::F::k(scan.spacing[1]);
+            // Rz(yaw) (x, y)
             let (along, across) = (sin.fnma(y, cos * x), sin.fma(x, cos * y));
             // the ground above the frame's origin
             let mut height = c(-1e18);
@@ -68,6 +72,7 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 let solid = &m.contacts.solids[place];
                 let axes = Mat3::constant(solid.axes);
                 let surface = match solid.kind {
+                    // a field is static: constants take p and the ray into its axes
                     Kind::Field => {
                         let at = cx.at(row);
                         let (origin, center) =
@@ -85,6 +90,7 @@ fn scan<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 };
                 height = height.max(surface);
             }
+            // d = p_z - z, at most the reach of the scan
             *ray = (-height).min(C::F::k(scan.reach));
         }
     }

@@ -39,16 +39,19 @@ impl Stage for Inertias {
         };
         let bodies = &m.outputs.bodies;
         for (k, body) in bodies.iter().enumerate() {
+            // the world body of a model has no inertia
             if body.parent == k {
                 b.work.cinert[k] = [zero; 10];
                 continue;
             }
             let mass = masses::mass(m, &b.params, body.link, body.mass);
+            // d, the columns of R I Rᵀ, and m d
             let d = position(&b.work, &body.inertial) - root_center(m, b, body);
             let x = masses::inertia_times(m, b, body, axis(0));
             let y = masses::inertia_times(m, b, body, axis(1));
             let z = masses::inertia_times(m, b, body, axis(2));
             let moment = d * mass;
+            // parallel axis theorem: xx yy zz xy xz yz of R I Rᵀ + m (|d|² 1 - d dᵀ), then m d and m
             b.work.cinert[k] = [
                 d[1].fma(moment[1], d[2].fma(moment[2], x[0])),
                 d[0].fma(moment[0], d[2].fma(moment[2], y[1])),

@@ -47,16 +47,20 @@ impl Stage for Momenta {
             // the spin itself turns the body about its centre of mass
             b.work.subtree_angmom[k] = masses::inertia_times(m, b, body, twist[ANGULAR]);
         }
+        // p(b) = m v(x) + Σ p(child), children before parents; then v(b) = p(b) / M(b)
         for (k, body) in bodies.iter().enumerate().rev() {
             let momentum = b.work.subtree_linvel[k];
             if body.parent != k {
                 let above = b.work.subtree_linvel[body.parent];
                 b.work.subtree_linvel[body.parent] = above + momentum;
             }
+            // a subtree without mass has p = 0, so any divisor gives v(b) = 0
             let whole = b.work.subtree_mass[k].max(C::F::c(MASS_MIN));
             b.work.subtree_linvel[k] = momentum * C::F::c(1.0).div(whole);
         }
+        // L(b), children before parents; velocities of all subtrees are complete by now
         for (k, body) in bodies.iter().enumerate().rev() {
+            // (x - c) × m (v(x) - v(b)): the body moves about the centre of mass of its subtree
             let point = position(&b.work, &body.inertial);
             let moving = velocity(&b.work, &body.inertial, point)[LINEAR];
             let mass = masses::mass(m, &b.params, body.link, body.mass);
@@ -65,9 +69,11 @@ impl Stage for Momenta {
             let orbital = (point - center).cross((moving - carried) * mass);
             w.subtree_angmom[k] = w.subtree_angmom[k] + orbital;
             let parent = body.parent;
+            // to the parent: L(b) + (c - c(parent)) × M (v(b) - v(parent))
             if parent != k {
                 let mut apart = center - w.subtree_center[parent];
                 let above = &bodies[parent].frame;
+                // centres are kept from the reference point of a tree; between trees add the difference of these
                 if above.tree != body.frame.tree {
                     apart = apart + (reference(w, &body.frame) - reference(w, above));
                 }

@@ -28,11 +28,13 @@ impl Stage for Poses {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
         for (k, body) in m.bodies.iter().enumerate() {
+            // orientation before the joint moves: that of the parent, then the rest rotation
             let rest = quat::constant(body.quat);
             let carried = match body.parent {
                 Some(parent) => mul(w.orientation[parent], rest),
                 None => rest,
             };
+            // the rotation of the joint follows; a free or mocap body has its orientation in the world
             w.orientation[k] = match body.motion {
                 Motion::Revolute => {
                     let half = cx.get(&b.joint_q[body.coord]) * C::F::c(0.5);
@@ -46,6 +48,7 @@ impl Stage for Poses {
             };
         }
         for (k, frame) in m.frames.iter().enumerate() {
+            // frames of links: R p + o from the reference point of the tree, which comes last
             let (position, rest) = (Vec3::constant(frame.position), quat::constant(frame.quat));
             let (position, orientation) = match frame.body {
                 Some(body) => (

@@ -46,23 +46,27 @@ impl Stage for SiteInverse {
 /// Writes the rows of J⁺ of the dofs that move each site, site by site.
 #[inline(always)]
 fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    // sites have rows one after the other, one row per dof that moves them
     let mut end = 0;
     for site in &m.sites {
         let first = end;
         end += site.columns.len();
         jacobian(w, site, first);
+        // [Jᵀ; λ 1] is [q; s] before its columns are made orthonormal
         let damping = F::k(site.damping);
         let mut s = [[F::c(0.0); SIX]; SIX];
         for i in 0..SIX {
             s[i][i] = damping;
         }
         orthonormalize(&mut w.site_inverse[first..end], &mut s);
+        // S / λ
         let undamped = F::c(1.0).div(damping);
         for i in 0..SIX {
             for j in i..SIX {
                 s[i][j] = s[i][j] * undamped;
             }
         }
+        // a row of J⁺ = Q Sᵀ / λ; S is upper triangular, so entry i sums over j ≥ i
         for k in first..end {
             let q = w.site_inverse[k];
             let mut row = [F::c(0.0); SIX];
@@ -71,6 +75,7 @@ fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
                     row[i] = q[j].fma(s[i][j], row[i]);
                 }
             }
+            // the inverse of Rᵀ J is J⁺ R: rotate both halves of the row into the axes of that frame
             if let Some(other) = &site.relative_to {
                 let [x, y, z, turn_x, turn_y, turn_z] = row;
                 let Vec3([x, y, z]) = to_local(w, other, Vec3([x, y, z]));
@@ -94,6 +99,7 @@ fn jacobian<F: Num>(w: &mut Workspace<F>, site: &Site<F::Real>, first: usize) {
         // the same point, from the reference point of the other robot
         there = here + (reference(w, &site.mount) - reference(w, other));
     }
+    // v(d) + ω(d) × p and ω(d), with the opposite sign for a dof that moves the other frame
     for (k, column) in site.columns.iter().enumerate() {
         let Spatial([linear, angular]) = w.motion[column.dof];
         let Vec3([turn_x, turn_y, turn_z]) = angular;
@@ -111,6 +117,7 @@ fn jacobian<F: Num>(w: &mut Workspace<F>, site: &Site<F::Real>, first: usize) {
 #[inline(always)]
 fn orthonormalize<F: Num>(q: &mut [[F; SIX]], s: &mut [[F; SIX]; SIX]) {
     for c in 0..SIX {
+        // squared norm of column c; below the diagonal, s is 0
         let mut square = F::c(0.0);
         for row in s[..c + 1].iter() {
             square = row[c].fma(row[c], square);
@@ -118,6 +125,7 @@ fn orthonormalize<F: Num>(q: &mut [[F; SIX]], s: &mut [[F; SIX]; SIX]) {
         for row in q.iter() {
             square = row[c].fma(row[c], square);
         }
+        // a column is never shorter than λ, so the division needs no guard
         let inverse = F::c(1.0).div(square.sqrt());
         for row in s[..c + 1].iter_mut() {
             row[c] = row[c] * inverse;
@@ -125,6 +133,7 @@ fn orthonormalize<F: Num>(q: &mut [[F; SIX]], s: &mut [[F; SIX]; SIX]) {
         for row in q.iter_mut() {
             row[c] = row[c] * inverse;
         }
+        // modified Gram-Schmidt: later columns lose their part along column c at once
         for d in c + 1..SIX {
             let mut along = F::c(0.0);
             for row in s[..c + 1].iter() {

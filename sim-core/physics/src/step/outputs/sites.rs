@@ -71,23 +71,29 @@ impl Stage for Imu {
 fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
+        // p, q and v of the site in world axes, with p from the reference point of its robot
         let (mut position, mut orientation) = (position(w, mount), orientation(w, mount));
         let mut velocity = velocity(w, mount, position);
         match &site.relative_to {
+            // only a position in the world contains the reference point, which may be large
             None => position = position + reference(w, mount),
             Some(other) => {
+                // p', q', v' and ω' of the frame that the site is relative to
                 let (there, from) = (self::position(w, other), self::orientation(w, other));
                 let Spatial([linear, angular]) = self::velocity(w, other, there);
+                // p - p': on one robot the reference points cancel, so only robots apart subtract them
                 position = position - there;
                 if mount.tree != other.tree {
                     let apart = reference(w, mount) - reference(w, other);
                     position = position + apart;
                 }
+                // Rᵀ (v - v' - ω' × (p - p')) and Rᵀ (ω - ω')
                 let carried = angular.cross_add(position, linear);
                 velocity = Spatial([
                     to_local(w, other, velocity[LINEAR] - carried),
                     to_local(w, other, velocity[ANGULAR] - angular),
                 ]);
+                // Rᵀ (p - p') last, because the velocity needs p - p' in world axes
                 position = to_local(w, other, position);
                 orientation = mul(conjugate(from), orientation);
             }
@@ -101,10 +107,12 @@ fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
 /// Writes angular velocity and proper acceleration of each site, in its own axes.
 #[inline(always)]
 fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // accelerations less gravity: those of bodies go to `force`, that of a static frame is returned
     let base = proper_accelerations(cx, m, b);
     let w = &mut b.work;
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
+        // a(b) + α × s + ω × (ω × s), with s = R p from the origin of the body
         let (acceleration, omega) = match mount.body {
             Some(body) => {
                 let arm = w.rotation[body] * Vec3::constant(mount.position);
@@ -113,6 +121,7 @@ fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             }
             None => (base, Vec3::zero()),
         };
+        // both readings in the axes of the site
         w.gyro[k] = to_local(w, mount, omega);
         w.accelerometer[k] = to_local(w, mount, acceleration);
     }

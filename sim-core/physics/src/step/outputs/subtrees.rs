@@ -40,9 +40,11 @@ impl Stage for Subtrees {
             b.work.subtree_center[k] = position(&b.work, &body.inertial) * mass;
         }
         let w = &mut b.work;
+        // children before parents: when a body is reached, M c and M have its whole subtree
         for (k, body) in bodies.iter().enumerate().rev() {
             let (moment, mass) = (w.subtree_center[k], w.subtree_mass[k]);
             let body_center = position(w, &body.inertial);
+            // c = M c / M, or the centre of the body itself if the subtree has no mass
             let is_light = mass.lt(C::F::c(MASS_MIN));
             let inverse = C::F::c(1.0).div(mass.max(C::F::c(MASS_MIN)));
             for i in 0..3 {
@@ -51,6 +53,7 @@ impl Stage for Subtrees {
             }
             w.subtree_com[k] = w.subtree_center[k] + reference(w, &body.frame);
             if body.parent != k {
+                // the parent adds M c, from the reference point of its own tree, and M
                 let above = &bodies[body.parent].frame;
                 let mut moment = moment;
                 if above.tree != body.frame.tree {
@@ -63,6 +66,7 @@ impl Stage for Subtrees {
             }
         }
         for (k, body) in bodies.iter().enumerate() {
+            // MuJoCo has the angular part first
             let Spatial([linear, angular]) = com_velocity(m, b, k, body);
             let (Vec3([x, y, z]), Vec3([u, v, w])) = (angular, linear);
             b.work.cvel[k] = [x, y, z, u, v, w];
@@ -103,6 +107,7 @@ pub(in crate::step) fn root_center<F: Num, V>(
     let w = &b.work;
     let root = &m.outputs.bodies[body.root];
     let center = w.subtree_center[body.root];
+    // within a tree no reference point enters
     if root.frame.tree == body.frame.tree {
         return center;
     }

@@ -22,11 +22,13 @@ impl Stage for Velocities {
         let w = &mut b.work;
         for (k, frame) in m.frames.iter().enumerate() {
             let center = Vec3::constant(frame.center);
+            // a static link stays where it is
             let Some(body) = frame.body else {
                 w.link_center[k] = center;
                 w.body_qd[k] = Spatial::zero();
                 continue;
             };
+            // v + ω × c, with c = R p + o from the reference point
             let center = w.rotation[body].mul_add(center, w.origin[body]);
             let velocity = w.velocity[body];
             let moved = velocity[ANGULAR].cross_add(center, velocity[LINEAR]);

@@ -51,13 +51,16 @@ impl Stage for Forces {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let base = proper_accelerations(cx, m, b);
         let bodies = &m.outputs.bodies;
+        // cacc of each body, and in `cfrc_int` the wrench (N, F) that its motion needs
         for (k, body) in bodies.iter().enumerate() {
             accelerate(m, b, k, body, base);
         }
+        // cfrc_ext begins with the contacts, which their loops sum in cells
         contact_wrenches(cx, m, b);
         for (k, cfrc) in b.work.cfrc_ext.iter_mut().enumerate() {
             *cfrc = std::array::from_fn(|i| cx.get(&b.contact_wrench[6 * k + i]));
         }
+        // body_f: a force at the centre of mass and a torque, per world; the world body of a model takes none
         if let Some(first) = m.varying.first(Param::BodyF) {
             for (k, body) in bodies
                 .iter()
@@ -71,6 +74,7 @@ impl Stage for Forces {
                 add(m, b, k, point, force, torque);
             }
         }
+        // connects and welds; `row` is the first constraint row of each tie
         let mut row = m.joint_rows();
         for tie in &m.ties {
             if let Measure::Frames(frames) = &tie.measure {
@@ -79,12 +83,14 @@ impl Stage for Forces {
             row += tie.rows;
         }
         let w = &mut b.work;
+        // (N, F) - cfrc_ext(b); the world body needs no force of its own
         for k in 0..bodies.len() {
             w.cfrc_int[k] = match bodies[k].parent == k {
                 true => [C::F::c(0.0); 6],
                 false => std::array::from_fn(|i| w.cfrc_int[k][i] - w.cfrc_ext[k][i]),
             };
         }
+        // + Σ cfrc_int(child), children before parents
         for (k, body) in bodies.iter().enumerate().rev() {
             if body.parent != k {
                 let wrench = w.cfrc_int[k];
@@ -105,10 +111,12 @@ fn accelerate<F: Num, V>(
     body: &OutputBody<F::Real>,
     base: Vec3<F>,
 ) {
+    // c and x, both from the reference point of the tree of the body
     let center = root_center(m, b, body);
     let mass = masses::mass(m, &b.params, body.link, body.mass);
     let w = &mut b.work;
     let point = position(w, &body.inertial);
+    // a(c) - ω × v(c) for cacc, a(x) for F; a static body has only the acceleration that stands for gravity
     let (at_center, at_point, alpha, omega) = match body.frame.body {
         Some(carrier) => {
             let Spatial([linear, omega]) = w.velocity[carrier];
@@ -125,6 +133,7 @@ fn accelerate<F: Num, V>(
         None => (base, base, Vec3::zero(), Vec3::zero()),
     };
     w.cacc[k] = six(alpha, at_center);
+    // F = m a(x), N = I α + ω × I ω + (x - c) × F
     let force = at_point * mass;
     let times = |v| masses::inertia_times(m, b, body, v);
     let moment = omega.cross_add(times(omega), times(alpha));
@@ -148,6 +157,7 @@ fn add<F: Num, V>(
     force: Vec3<F>,
     torque: Vec3<F>,
 ) {
+    // torque about the centre of mass of the tree: τ + (p - c) × F
     let arm = point - root_center(m, b, &m.outputs.bodies[k]);
     let moved = six(arm.cross_add(force, torque), force);
     for (sum, x) in b.work.cfrc_ext[k].iter_mut().zip(moved) {
@@ -164,12 +174,15 @@ fn tie_wrenches<C: Cx>(
     frames: &Frames<<C::F as Num>::Real>,
     row: usize,
 ) {
+    // the first three rows of a tie are the force on its first body
     let three = |first: usize| Vec3(std::array::from_fn(|i| cx.get(&b.efc_force[first + i])));
     let force = three(row);
+    // of a weld, three more rows give a torque by the transpose of their Jacobian
     let torque = match frames.torque_scale {
         Some(scale) => tied_frames::torque(&b.work, frames, scale, three(row + 3)),
         None => Vec3::zero(),
     };
+    // action on the first body and reaction on the second, each at the origin of its frame
     let sides = [
         (&frames.first, C::F::c(1.0)),
         (&frames.second, C::F::c(-1.0)),
@@ -192,6 +205,7 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     let t = &m.contacts;
     for (number, class) in t.classes.iter().enumerate() {
+        // only classes whose contacts act on bodies of the outputs
         let touched = t.bodies.of_classes.get(number);
         let Some(bodies) = touched.filter(|all| !all.is_empty()) else {
             continue;
@@ -199,6 +213,7 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let list = class_list(cx, t, number);
         each!(cx, r in list, {
             let pair = cx.load(t.memory.rows, r, row::PAIR);
+            // which bodies of the class the pair is about, counted from 1; 0 is none of them
             let sides = [
                 cx.pick(t.bodies.of_pair, pair, 0),
                 cx.pick(t.bodies.of_pair, pair, 1),
@@ -208,15 +223,18 @@ fn contact_wrenches<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             for (place, &k) in bodies.iter().enumerate() {
                 let body = &m.outputs.bodies[k];
                 let slot = C::F::c((place + 1) as f64);
+                // +1 on the second side, -1 on the first, 0 on neither: a factor, since each world has another pair
                 let [first, second] = map(sides, |side| {
                     let is_it = (side - slot).abs().lt(half);
                     C::F::select(is_it, one, zero)
                 });
                 let sign = second - first;
+                // arm from c to the contact; between trees add the difference of their reference points
                 let mut arm = point - root_center(m, b, body);
                 if body.frame.tree != Some(class.trees.1) {
                     arm = arm + (there - reference(&b.work, &body.frame));
                 }
+                // (τ + r × F, F), with its sign, onto the sum of the body
                 let moved = six(arm.cross_add(force, torque), force);
                 for (cell, x) in b.contact_wrench[6 * k..6 * k + 6].iter_mut().zip(moved) {
                     let sum = x.fma(sign, cx.get(cell));
@@ -233,6 +251,7 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
     let t = &m.contacts;
     let rows = t.memory.rows;
     let point = load_vec3(cx, rows, r, row::POINT);
+    // columns: normal and tangents, along which a contact keeps its force
     let frame = Mat3([
         load_vec3(cx, rows, r, row::NORMAL),
         load_vec3(cx, rows, r, row::TANGENTS),
@@ -240,6 +259,7 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
     ]);
     let force = load_vec3(cx, rows, r, row::FORCE);
     let mut torque = Vec3::zero();
+    // torsional and rolling rows are scaled by their friction over that of sliding, so a torque is too
     if let Some(block) = t.classes[number].turns {
         let pair = cx.load(rows, r, row::PAIR);
         let twist = cx.pick(t.turning, pair, 0);

@@ -98,6 +98,7 @@ fn contact<C: Cx>(
 ) -> Contact<C::F> {
     let t = &m.contacts;
     let rows = t.memory.rows;
+    // normal and tangents of the solver
     let pair = cx.load(rows, r, row::PAIR);
     let frame = [
         load_vec3(cx, rows, r, row::NORMAL),
@@ -105,12 +106,14 @@ fn contact<C: Cx>(
         load_vec3(cx, rows, r, row::TANGENTS + 3),
     ];
     let mut torque = Vec3::zero();
+    // torsional and rolling rows are scaled by their friction over that of sliding, so a torque is too
     if let Some(block) = t.classes[class].turns {
         let twist = cx.pick(t.turning, pair, 0);
         let roll = cx.pick(t.turning, pair, 1);
         let Vec3([x, y, z]) = load_vec3(cx, rows, r, block + turning::FORCE);
         torque = Vec3([x * twist, y * roll, z * roll]);
     }
+    // rows have points from the reference point of the second tree
     let there = b.work.reference[t.classes[class].trees.1];
     Contact {
         point: load_vec3(cx, rows, r, row::POINT) + there,
@@ -147,8 +150,10 @@ fn touched<C: Cx>(
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
             let contact = contact(cx, m, b, (class, touch.column), r);
+            // the ray along the normal out of the body that the sensor is on
             let point = in_zone(b, &touch.zone, contact.point);
             let outwards = to_local(&b.work, &touch.zone.site, contact.frame[0] * contact.sense);
+            // a contact counts if it pushes, is one of the body, and its ray meets the zone
             let normal = contact.force[0];
             let counts: MaskOf<C> = zero.lt(normal)
                 & zero.lt(contact.sense.abs())
@@ -169,6 +174,7 @@ fn turn<F: Num, V>(
     pair: F,
     contact: &mut Contact<F>,
 ) {
+    // of a plane and a capsule the first tangent lies along the capsule; which pair it is differs per world
     let mut along = None;
     for &(number, solid) in &sensor.capsules {
         let solid = &m.contacts.solids[solid];
@@ -185,6 +191,7 @@ fn turn<F: Num, V>(
             F::select(is_it, axis[2], before[2]),
         ]));
     }
+    // the same force and torque along the new tangents
     let normal = contact.frame[0];
     let [first, second] = tangents(normal, along);
     let frame = Mat3([normal, first, second]);
@@ -201,6 +208,7 @@ fn matches<C: Cx>(
     sensor: &ContactSensor<<C::F as Num>::Real>,
     contact: &Contact<C::F>,
 ) -> MaskOf<C> {
+    // sense is 0 for pairs of other sensors
     let is_of = C::F::c(0.5).lt(contact.sense.abs());
     match &sensor.zone {
         Some(zone) => is_of & holds(zone, in_zone(b, zone, contact.point)),
@@ -211,9 +219,11 @@ fn matches<C: Cx>(
 /// The record of a contact.
 #[inline(always)]
 fn record<F: Num>(contact: &Contact<F>) -> [F; RECORD] {
+    // (n · F, s t₁ · F, d t₂ · F) with d = e s, and torques alike
     let (s, e) = (contact.order, contact.sense);
     let d = s * e;
     let seen = |v: Vec3<F>| Vec3([v[0], v[1] * s, v[2] * d]);
+    // place 6, which no part covers, keeps the distance
     let mut all = [contact.distance; RECORD];
     let parts = [
         (0, seen(contact.force)),
@@ -239,7 +249,8 @@ fn records<C: Cx>(
 ) {
     let zero = C::F::c(0.0);
     let mut total = cx.var(zero);
-    for slot in 0..own.records {
+    // empty slots: any contact has a smaller key
+    for slot in 0..contact_sensor.records {
         for k in 0..SLOT {
             let start = if k == RECORD { C::F::c(EMPTY) } else { zero };
             cx.set(&mut b.contact_records[slot * SLOT + k], start);
@@ -248,21 +259,24 @@ fn records<C: Cx>(
     for &class in &contact_sensor.classes {
         let list = class_list(cx, &m.contacts, class);
         each!(cx, r in list, {
+            // the contact with the tangents of MuJoCo, and whether the sensor counts it
             let mut contact = contact(cx, m, b, (class, contact_sensor.column), r);
             let pair = cx.load(m.contacts.memory.rows, r, row::PAIR);
             turn(m, b, contact_sensor, pair, &mut contact);
             let is_found = matches::<C>(b, contact_sensor, &contact);
+            // slots are sorted by rising keys: depth, size of the force, or order of the rows
             let key = match contact_sensor.reduction {
                 Reduction::LeastDistance => contact.distance,
                 Reduction::LargestForce => -contact.force.dot(contact.force),
                 Reduction::First | Reduction::NetForce => cx.get(&total),
             };
+            // the total also counts contacts for which no slot is left
             let more = cx.get(&total) + C::F::select(is_found, C::F::c(1.0), zero);
             cx.set(&mut total, more);
             let mut carried = [C::F::select(is_found, key, C::F::c(EMPTY)); SLOT];
             carried[..RECORD].copy_from_slice(&record(&contact));
             // insertion: what a slot loses goes on to the next one
-            for slot in 0..own.records {
+            for slot in 0..contact_sensor.records {
                 let cells = slot * SLOT..(slot + 1) * SLOT;
                 let kept = cx.get(&b.contact_records[slot * SLOT + RECORD]);
                 let is_better = carried[RECORD].lt(kept);
@@ -275,7 +289,8 @@ fn records<C: Cx>(
         });
     }
     let total = cx.get(&total);
-    for slot in 0..own.records {
+    // slots beyond the total are 0, count included
+    for slot in 0..contact_sensor.records {
         let is_there = C::F::c(slot as f64 + 0.5).lt(total);
         let kept: [C::F; RECORD] =
             std::array::from_fn(|k| cx.get(&b.contact_records[slot * SLOT + k]));
@@ -302,12 +317,14 @@ fn show<F: Num>(
     count: F,
     record: &[F; RECORD],
 ) {
+    // scalars of count, force, torque, distance, position, normal, tangent
     let sizes = [1, 3, 3, 1, 3, 3, 3];
     let width: usize = sizes
         .iter()
         .zip(contact_sensor.shows)
         .map(|(size, shows)| size * usize::from(shows))
         .sum();
+    // the parts that are shown stand side by side; the count is no part of the record
     let (mut place, mut first) = (sensor.first + slot * width, 0);
     for (part, (size, shows)) in sizes.into_iter().zip(contact_sensor.shows).enumerate() {
         let scalars = match part {
@@ -341,9 +358,11 @@ fn net_force<C: Cx>(
         each!(cx, r in list, {
             let contact = contact(cx, m, b, (class, contact_sensor.column), r);
             let is_found = matches::<C>(b, contact_sensor, &contact);
+            // force and torque in world axes, on the second object of the sensor
             let [force, torque] = map([contact.force, contact.torque], |v| {
                 contact.frame.mul_add(v, Vec3::zero()) * contact.sense
             });
+            // torque about the origin τ + p × F, and p weighted by |F|
             let moment = contact.point.cross_add(force, torque);
             let weight = force.dot(force).sqrt();
             let point = contact.point * weight;
@@ -352,6 +371,7 @@ fn net_force<C: Cx>(
             for (first, part) in [(2, force), (5, moment), (8, point)] {
                 more[first..first + 3].copy_from_slice(&part.0);
             }
+            // worlds whose contact is of another pair add 0
             for (sum, x) in sums.iter_mut().zip(more) {
                 let whole = cx.get(sum) + C::F::select(is_found, x, zero);
                 cx.set(sum, whole);
@@ -360,10 +380,12 @@ fn net_force<C: Cx>(
     }
     let sums: [C::F; 11] = std::array::from_fn(|k| cx.get(&sums[k]));
     let three = |first: usize| Vec3([sums[first], sums[first + 1], sums[first + 2]]);
+    // centre of the points p, and the torque about it, τ - p × F; the guard is for contacts without force
     let is_there = C::F::c(0.5).lt(sums[0]);
     let inverse = one.div(sums[1].max(C::F::c(1e-15)));
     let (force, point) = (three(2), three(8) * inverse);
     let torque = three(5) - point.cross(force);
+    // the record is in world axes: normal x, tangent y
     let mut record = [zero; RECORD];
     let axis = |k: usize| Vec3(std::array::from_fn(|i| if i == k { one } else { zero }));
     let parts = [

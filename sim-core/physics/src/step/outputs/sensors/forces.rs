@@ -38,12 +38,14 @@ impl Stage for Accelerations {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+        // accelerations less gravity of all bodies, to `force`
         proper_accelerations(cx, m, b);
         let w = &mut b.work;
         for sensor in &m.sensors.all {
             let SensorKind::Acceleration(frame) = &sensor.kind else {
                 continue;
             };
+            // a(b) + α × s + ω × (ω × s), with s from the origin of the body
             let Spatial([linear, angular]) = match frame.of.body {
                 Some(body) => {
                     let arm = w.rotation[body] * Vec3::constant(frame.of.position);
@@ -53,6 +55,7 @@ impl Stage for Accelerations {
                 // as in MuJoCo, what stands still does not feel gravity
                 None => Spatial::zero(),
             };
+            // the part that is asked for, in world axes or in those of the frame
             let mut vector = if frame.is_angular { angular } else { linear };
             if frame.is_local {
                 vector = to_local(w, &frame.of, vector);
@@ -86,10 +89,12 @@ impl Stage for Wrenches {
             let SensorKind::Wrench(wrench) = &sensor.kind else {
                 continue;
             };
+            // the wrench (N, F) from parent to body, with N about the centre of mass of the tree
             let [x, y, z, u, v, w] = b.work.cfrc_int[wrench.body];
             let (torque, force) = (Vec3([x, y, z]), Vec3([u, v, w]));
             // the torque about the site
             let body = &m.outputs.bodies[wrench.body];
+            // arm of the site from there: the torque about the site is N - r × F
             let arm = position(&b.work, &wrench.site) - root_center(m, b, body);
             let vector = if wrench.is_torque {
                 torque - arm.cross(force)
@@ -133,6 +138,7 @@ impl Stage for Forces {
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for sensor in &m.sensors.all {
             let scalar = match &sensor.kind {
+                // one actuator, or the sum over those of a tendon
                 SensorKind::ActuatorForces(actuators) => {
                     let mut sum = C::F::c(0.0);
                     for &actuator in actuators {
@@ -140,6 +146,7 @@ impl Stage for Forces {
                     }
                     sum
                 }
+                // a model without actuators has no array of their forces
                 SensorKind::DofActuatorForce(dof) => match b.work.qfrc_actuator.get(*dof) {
                     Some(force) => *force,
                     None => C::F::c(0.0),
@@ -162,13 +169,16 @@ fn dof_limit<C: Cx>(
     dof: usize,
     part: LimitPart,
 ) -> C::F {
+    // from last to first: the first row that acts in a world is selected last and stays
     let mut value = C::F::c(0.0);
+    // rows of limits follow those of equalities and frictions
     let first = m.equalities.len() + m.frictions.len();
     for (k, limit) in m.limits.iter().enumerate().rev() {
         if limit.dof != dof {
             continue;
         }
         let side = b.work.limit_side[k];
+        // distance to the nearer bound, its rate of change, or the force of the row
         let property = match part {
             LimitPart::Position => {
                 let q = cx.get(&b.joint_q[m.dofs[dof].coord]);
@@ -177,6 +187,7 @@ fn dof_limit<C: Cx>(
             LimitPart::Velocity => side * cx.get(&b.joint_qd[dof]),
             LimitPart::Force => cx.get(&b.efc_force[first + k]),
         };
+        // a row without weight does not act in this world
         let acts = C::F::c(0.0).lt(cx.get(&b.efc_weight[first + k]));
         value = C::F::select(acts, property, value);
     }
@@ -192,10 +203,12 @@ fn tie_limit<C: Cx>(
     ties: &[usize],
     part: LimitPart,
 ) -> C::F {
+    // from last to first, as for dofs
     let mut value = C::F::c(0.0);
     for &tie in ties.iter().rev() {
         let row = m.joint_rows() + rows_before(&m.ties[..tie]);
         let tie = &m.ties[tie];
+        // as for dofs; the rate is J q̇ of the first row
         let property = match part {
             LimitPart::Position => {
                 let position = measured(cx, m, b, tie);
@@ -232,6 +245,7 @@ fn measured<C: Cx>(
     match &tie.measure {
         Measure::Lengths(lengths) => length(cx, m, b, &lengths.first) - C::F::k(lengths.offsets[0]),
         Measure::Angle(coord, _) => {
+            // |log q|: the angle by which the ball has rotated
             let turn = quat::log(read_quat(cx, &b.joint_q, *coord));
             turn.dot(turn).sqrt()
         }
@@ -266,6 +280,7 @@ impl Stage for Energies {
         for sensor in &m.sensors.all {
             let energy = match &sensor.kind {
                 SensorKind::KineticEnergy => b.work.kinetic_energy[0],
+                // the array leaves out static bodies, MuJoCo does not: their first moment is fixed unless masses vary
                 SensorKind::PotentialEnergy(moment) => {
                     let gravity = gravity(m, &b.params);
                     let moment = match masses::vary(m) {

@@ -37,6 +37,7 @@ fn put_at<F: Num>(data: &mut [F], first: usize, cutoff: Option<&Cutoff<F::Real>>
             None => *x,
             Some(cutoff) => {
                 let most = F::k(cutoff.most);
+                // MuJoCo bounds a sensor of positive values from above only
                 let bounded = x.min(most);
                 if cutoff.is_two_sided {
                     bounded.max(-most)

@@ -38,6 +38,7 @@ impl Stage for Rays {
             let SensorKind::Range(site, geoms) = &sensor.kind else {
                 continue;
             };
+            // least distance of all geoms; -1 stands for none, so it is never the nearer one
             let mut nearest = none;
             for &geom in geoms {
                 let range = seen(&b.work, site, &m.sensors.geoms[geom]);
@@ -53,10 +54,12 @@ impl Stage for Rays {
 /// Distance from a site along its z axis to a geom, or -1.
 #[inline(always)]
 fn seen<F: Num>(w: &Workspace<F>, site: &Mount<F::Real>, geom: &RayGeom<F::Real>) -> F {
+    // origin of the site from that of the geom; within a tree reference points cancel
     let mut apart = position(w, site) - position(w, &geom.at);
     if site.tree != geom.at.tree {
         apart = apart + (reference(w, site) - reference(w, &geom.at));
     }
+    // the ray in the axes of the geom
     let point = to_local(w, &geom.at, apart);
     let along = to_local(w, &geom.at, axes(w, site)[2]);
     match geom.kind {
@@ -69,6 +72,7 @@ fn seen<F: Num>(w: &Workspace<F>, site: &Mount<F::Real>, geom: &RayGeom<F::Real>
 #[inline(always)]
 fn to_plane<F: Num>(size: [F::Real; 3], point: Vec3<F>, along: Vec3<F>) -> F {
     let (zero, none) = (F::c(0.0), F::c(-1.0));
+    // t = -z / d_z for a ray towards the front, d_z < 0; other rays divide by -1 and do not count
     let comes = along[2].lt(F::c(-PARALLEL));
     let range = (-point[2]).div(F::select(comes, along[2], none));
     let mut is_met = comes & !range.lt(zero);

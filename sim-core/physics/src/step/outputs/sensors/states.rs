@@ -66,6 +66,7 @@ impl Stage for States {
                 SensorKind::ActuatorLength(k) => &[b.work.actuator_length[*k]],
                 SensorKind::ActuatorRate(k) => &[b.work.actuator_velocity[*k]],
                 SensorKind::BallQuat(coord) => {
+                    // (w, x, y, z) as in MuJoCo
                     let q = |k: usize| cx.get(&b.joint_q[coord + k]);
                     &[q(3), q(0), q(1), q(2)]
                 }
@@ -98,6 +99,7 @@ fn rate<C: Cx>(cx: &mut C, b: &BlockOf<C>, terms: &[Term<<C::F as Num>::Real>]) 
 /// Orientation of a frame, (w, x, y, z).
 #[inline(always)]
 fn quat<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> [F; 4] {
+    // q, or q'⁻¹ q as seen from another frame
     let world_quat = orientation(w, &frame.of);
     let [x, y, z, real] = match &frame.from {
         Some(from) => mul(conjugate(orientation(w, from)), world_quat),
@@ -112,11 +114,13 @@ fn property<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> Vec3<F> {
     let (of, from) = (&frame.of, frame.from.as_ref());
     let place = position(w, of);
     let vector = match frame.part {
+        // p - p' between frames, or p + r in the world
         FramePart::Position => match from {
             Some(from) => from_there(w, of, from),
             None => place + reference(w, of),
         },
         FramePart::Axis(k) => axes(w, of)[k],
+        // v - v' - ω' × (p - p')
         FramePart::Velocity => {
             let linear = velocity(w, of, place)[LINEAR];
             match from {
@@ -128,6 +132,7 @@ fn property<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> Vec3<F> {
                 None => linear,
             }
         }
+        // ω - ω'; quaternions have a function of their own
         FramePart::Spin | FramePart::Quat => {
             let spin = velocity(w, of, place)[ANGULAR];
             match from {
@@ -136,6 +141,7 @@ fn property<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> Vec3<F> {
             }
         }
     };
+    // in the axes of the other frame, or of the frame itself
     match from {
         Some(from) => to_local(w, from, vector),
         None if frame.is_local => to_local(w, of, vector),
@@ -147,6 +153,7 @@ fn property<F: Num>(w: &Workspace<F>, frame: &FrameSensor<F::Real>) -> Vec3<F> {
 #[inline(always)]
 fn from_there<F: Num>(w: &Workspace<F>, of: &Mount<F::Real>, from: &Mount<F::Real>) -> Vec3<F> {
     let apart = position(w, of) - position(w, from);
+    // within a tree reference points cancel
     if of.tree == from.tree {
         return apart;
     }

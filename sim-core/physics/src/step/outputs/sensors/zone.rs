@@ -31,6 +31,7 @@ impl<F: Num> Span<F> {
     /// The least interval that has both, one of which may be empty.
     #[inline(always)]
     fn or(self, other: Span<F>) -> Span<F> {
+        // an empty interval becomes [FAR, -FAR], which does not widen the other
         let (far, none) = (F::c(FAR), F::c(-FAR));
         let [one, two] = map([self, other], |span| {
             let is_empty = span.last.lt(span.first);
@@ -71,6 +72,7 @@ pub(in crate::step::outputs::sensors) fn distance<F: Num>(
     point: Vec3<F>,
     along: Vec3<F>,
 ) -> F {
+    // a ray that begins inside has first < 0 and meets the surface where it leaves
     let Span { first, last } = inside(kind, size, point, along);
     let ahead = Span { first, last }.is_ahead();
     let nearest = F::select(first.lt(F::c(0.0)), last, first);
@@ -84,10 +86,12 @@ fn inside<F: Num>(kind: ZoneKind, size: [F::Real; 3], point: Vec3<F>, along: Vec
     match kind {
         ZoneKind::Sphere => ball(point, along, a),
         ZoneKind::Ellipsoid => {
+            // in coordinates where the ellipsoid is the unit ball; t stays the same
             let scale = |v: Vec3<F>| Vec3([v[0].div(a), v[1].div(b), v[2].div(c)]);
             ball(scale(point), scale(along), F::c(1.0))
         }
         ZoneKind::Box => {
+            // a box is what its three slabs share
             let x = slab(point[0], along[0], a);
             let y = slab(point[1], along[1], b);
             let z = slab(point[2], along[2], c);
@@ -95,6 +99,7 @@ fn inside<F: Num>(kind: ZoneKind, size: [F::Real; 3], point: Vec3<F>, along: Vec
         }
         ZoneKind::Cylinder => tube(point, along, a, b),
         ZoneKind::Capsule => {
+            // a capsule is convex, so its interval is the least one around those of the tube and both balls
             let end = |sign: f64| Vec3([point[0], point[1], b.fnma(F::c(sign), point[2])]);
             let ends = [ball(end(1.0), along, a), ball(end(-1.0), along, a)];
             tube(point, along, a, b).or(ends[0]).or(ends[1])
@@ -114,12 +119,14 @@ pub(in crate::step::outputs::sensors) fn holds<F: Num>(
     match zone.kind {
         ZoneKind::Sphere => point.dot(point).lt(a * a),
         ZoneKind::Ellipsoid => {
+            // (x/a)² + (y/b)² + (z/c)² < 1
             let scaled = Vec3([x.div(a), y.div(b), z.div(c)]);
             scaled.dot(scaled).lt(F::c(1.0))
         }
         ZoneKind::Box => x.abs().lt(a) & y.abs().lt(b) & z.abs().lt(c),
         ZoneKind::Cylinder => across.lt(a * a) & z.abs().lt(b),
         ZoneKind::Capsule => {
+            // distance from the segment between both ends: past an end, z counts too
             let beyond = (z.abs() - b).max(F::c(0.0));
             beyond.fma(beyond, across).lt(a * a)
         }
@@ -129,6 +136,7 @@ pub(in crate::step::outputs::sensors) fn holds<F: Num>(
 /// |x + t d| ≤ half
 #[inline(always)]
 fn slab<F: Num>(x: F, d: F, half: F) -> Span<F> {
+    // t at both planes; a parallel ray is inside for all t or for none
     let parallel = d.abs().lt(F::c(PARALLEL));
     let inverse = F::c(1.0).div(F::select(parallel, F::c(1.0), d));
     let (s, t) = ((half - x) * inverse, (-half - x) * inverse);
@@ -149,6 +157,7 @@ fn ball<F: Num>(p: Vec3<F>, d: Vec3<F>, radius: F) -> Span<F> {
 /// A cylinder along z.
 #[inline(always)]
 fn tube<F: Num>(p: Vec3<F>, d: Vec3<F>, radius: F, half: F) -> Span<F> {
+    // a circle as seen along z, and a slab along it
     let flat = |u: Vec3<F>, v: Vec3<F>| u[0].fma(v[0], u[1] * v[1]);
     let side = quadratic(flat(d, d), flat(p, d), radius.fnma(radius, flat(p, p)));
     side.and(slab(p[2], d[2], half))
@@ -158,6 +167,7 @@ fn tube<F: Num>(p: Vec3<F>, d: Vec3<F>, radius: F, half: F) -> Span<F> {
 #[inline(always)]
 fn quadratic<F: Num>(a: F, b: F, c: F) -> Span<F> {
     let zero = F::c(0.0);
+    // roots of the quadratic; without a real root the interval is empty
     let constant = a.lt(F::c(PARALLEL * PARALLEL));
     let square = b.fma(b, -(a * c));
     let root = square.max(zero).sqrt();
@@ -167,6 +177,7 @@ fn quadratic<F: Num>(a: F, b: F, c: F) -> Span<F> {
     let misses = square.lt(zero);
     let first = F::select(misses, far, (-b - root) * inverse);
     let last = F::select(misses, none, (root - b) * inverse);
+    // without t² the ray is parallel to the surface: inside for all t or for none
     Span {
         first: F::select(constant, F::select(inside, none, far), first),
         last: F::select(constant, F::select(inside, far, none), last),
