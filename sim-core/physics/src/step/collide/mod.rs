@@ -62,11 +62,13 @@ impl Stage for Place {
 #[inline(always)]
 fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     let (w, memory) = (&b.work, &m.contacts.memory);
+    // no contacts yet, none of the room used, none left out
     for count in 0..memory.counts.rows {
         let (row, zero) = (cx.at(count), C::F::c(0.0));
         cx.fill(memory.counts, row, 0, zero);
     }
     for (k, solid) in m.contacts.solids.iter().enumerate() {
+        // R A and R c + o of a shape on a body; an upright shape has A = 1
         let mut axes = Mat3::constant(solid.axes);
         let mut center = Vec3::constant(solid.center);
         if let Some(body) = solid.body {
@@ -78,15 +80,18 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
             }
             center = r.mul_add(center, w.origin[body]);
         }
+        // axes by columns, then the centre from the reference point of the tree
         let row = cx.at(k);
         cx.fill_all(memory.poses, row, 0, axes[0].0);
         cx.fill_all(memory.poses, row, 3, axes[1].0);
         cx.fill_all(memory.poses, row, 6, axes[2].0);
         cx.fill_all(memory.poses, row, 9, center.0);
+        // friction of shapes where it differs per world
         if let Some(first) = m.varying.first(Param::ShapeMu) {
             cx.fill(memory.mu, row, 0, b.params[first + solid.shape]);
         }
     }
+    // origins: the reference point of each tree
     for (t, reference) in w.reference.iter().enumerate() {
         let row = cx.at(t);
         cx.fill_all(memory.origins, row, 0, reference.0);
@@ -100,6 +105,7 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
 #[inline(always)]
 fn collide_group<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>) {
     if let Some(group) = t.group(N::KINDS) {
+        // where loads are slow, several pairs are tested at once
         if C::GATHERS_LOADS && t.handles.pair_blocks.rows > 0 && group.blocks() > 0 {
             return collide_blocks::<C, N>(cx, t);
         }
@@ -127,6 +133,7 @@ fn collide_blocks<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real
             near = near + C::F::select(is_near, C::F::c(f64::from(1u32 << k)), zero);
         }
         when!(cx, half.lt(near), {
+            // bits from the lowest: half of the rest, rounded down, are the others
             let mut rest = cx.var(near);
             let first = cx.index(blocks, block, 0, pairs);
             let end = cx.index(blocks, block, BLOCK, pairs + 1);
@@ -159,10 +166,12 @@ impl<C: Cx> PairTest<C> {
     fn read(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> PairTest<C> {
         let indices = t.handles.pair_indices;
         let (poses, origins) = (t.memory.poses, t.memory.origins);
+        // rows of both shapes, and of the reference points of their trees
         let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
         let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
         let origin_a = cx.index(indices, p, pair::ORIGIN_A, origins.rows);
         let origin_b = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
+        // c = (c_b - c_a) + (o_b - o_a): large origins enter only by their difference, so `f32` keeps the digits
         let center_a = load_vec3(cx, poses, a, 9);
         let origin_a = load_vec3(cx, origins, origin_a, 0);
         let between = load_vec3(cx, origins, origin_b, 0) - origin_a;
@@ -184,6 +193,7 @@ impl<C: Cx> PairTest<C> {
         t: &Contacts<<C::F as Num>::Real>,
         p: C::I,
     ) -> MaskOf<C> {
+        // |c|² < r², or n · c < r above a plane; r contains the reach
         let radius = cx.constant(t.handles.pair_numbers, p, pair::RADIUS);
         match N::KINDS.0 {
             Kind::Plane => load_vec3(cx, t.memory.poses, self.a, 6)
@@ -209,6 +219,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
         center,
     } = test;
     when!(cx, near, {
+        // only near pairs load the rest
         let axes_a = axes_of(cx, poses, a);
         let shape_a = Shape::read(cx, t, kinds.0, p, pair::SIZE_A, pair::HULL_A);
         // sphere against bounding box: the sphere around a table is as wide as the table
@@ -218,6 +229,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
             near = sphere_near_box(&axes_a, shape_a.bounding_box(kinds.0), center, radius);
         }
         when!(cx, near, {
+            // the pair for the narrow phase; its margin is the reach and the rounding of distances
             let pose_b = ShapePose {
                 axes: axes_of(cx, poses, b),
                 center,
@@ -234,6 +246,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
                 clip_tables: t.memory.cut,
                 two_point_capsule_boxes: t.two_point_capsule_boxes,
             };
+            // bounding box of the second shape, and of both where it pays
             let near = boxes_near::<C, N>(cx, t, p, &shapes, near);
             when!(cx, near, {
                 let mut points = points_of::<C>(cx, t, p, center_a, origin_a);
@@ -252,6 +265,7 @@ fn boxes_near<C: Cx, N: Narrow>(
     shapes: &ShapePair<'_, C>,
     near: MaskOf<C>,
 ) -> MaskOf<C> {
+    // the sphere around the first shape against the bounding box of the second
     let (kinds, mut near, pose_b) = (N::KINDS, near, shapes.pose_b);
     if kinds.1 >= Kind::Box && kinds.0 != Kind::Plane {
         let radius = cx.constant(t.handles.pair_numbers, p, pair::RADIUS_A);
@@ -290,6 +304,7 @@ fn axes_of<C: Cx>(cx: &mut C, poses: Table, row: C::I) -> Mat3<C::F> {
 /// Is the sphere at `center` from a box, or the box at `center` from the sphere, nearer than a radius? (Arvo 1990)
 #[inline(always)]
 fn sphere_near_box<F: Num>(axes: &Mat3<F>, half: Vec3<F>, center: Vec3<F>, radius: F) -> F::Mask {
+    // squared distance of a point from a box: Σ max(|a · c| - h, 0)²
     let mut square = F::c(0.0);
     for (axis, half) in axes.iter().zip(*half) {
         let beyond = ((*axis).dot(center).abs() - half).max(F::c(0.0));
@@ -310,6 +325,7 @@ fn boxes_overlap<F: Num>(
     // the largest gap along any axis; overlapping boxes have none
     let mut gap = F::c(-1.0);
     let mut widths = [F::c(0.0); 3];
+    // axes of the first box: |a · c| - (h + Σ |a · bⱼ| hⱼ); its widths along bⱼ are summed beside
     for (axis, half) in axes.iter().zip(*half) {
         let mut width = half;
         for j in 0..3 {
@@ -319,6 +335,7 @@ fn boxes_overlap<F: Num>(
         }
         gap = gap.max((*axis).dot(other.center).abs() - (width + reach));
     }
+    // axes of the second box, with these widths
     for j in 0..3 {
         let width = widths[j] + other_half[j] + reach;
         gap = gap.max(other.axes[j].dot(other.center).abs() - width);
@@ -330,10 +347,12 @@ fn boxes_overlap<F: Num>(
 #[inline(always)]
 fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C::F {
     let (indices, table) = (t.handles.pair_indices, t.memory.mu);
+    // friction of both shapes, in each world
     let a = cx.index(indices, p, pair::SOLID_A, table.rows);
     let b = cx.index(indices, p, pair::SOLID_B, table.rows);
     let (a, b) = (cx.load(table, a, 0), cx.load(table, b, 0));
     let mut mu = t.combine.of(a, b);
+    // some pairs keep the larger coefficient, however the others combine theirs
     if t.keeps_max.rows > 0 {
         let keeps = C::F::c(0.5).lt(cx.constant(t.keeps_max, p, 0));
         mu = C::F::select(keeps, a.max(b), mu);
@@ -352,9 +371,11 @@ fn points_of<C: Cx>(
 ) -> Points<C> {
     let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let origins = t.memory.origins;
+    // the reference point that rows of the class count from
     let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
     let origin = load_vec3(cx, origins, origin, 0);
     let class = cx.index(indices, p, pair::CLASS, t.classes.len());
+    // the part of the table of rows that the class has
     let [first_end, capacity_end] = t.row_ends();
     let first = cx.index(t.handles.class_rows, class, 0, first_end);
     let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);

@@ -42,6 +42,7 @@ impl<C: Cx> Shape<C> {
                 cx.constant(scalars, p, size + 1),
                 cx.constant(scalars, p, size + 2),
             ]),
+            // other kinds have no row of hulls, so any index will do
             hull: match kind {
                 Kind::Hull => cx.index(indices, p, hull, t.hulls.spans.rows),
                 _ => cx.at(0),
@@ -100,6 +101,7 @@ impl<F: Num> ShapePose<F> {
     /// Pose in this frame of a shape at the origin with these axes.
     #[inline(always)]
     pub fn to_local(self, axes: &Mat3<F>) -> ShapePose<F> {
+        // the inverse pose: Rᵀ A and -Rᵀ c
         let axes = [
             self.axes.transpose_mul(axes[0]),
             self.axes.transpose_mul(axes[1]),

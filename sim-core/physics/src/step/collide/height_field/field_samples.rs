@@ -11,6 +11,7 @@ use crate::step::collide::convex::prism::{Half, Lattice, Prism};
 /// The largest integer that is not above x.
 #[inline(always)]
 fn floor<F: Num>(x: F) -> F {
+    // backends round to the nearest, which may be above
     let near = x.round();
     near - F::select(x.lt(near), F::c(1.0), F::c(0.0))
 }
@@ -125,11 +126,13 @@ impl<F: Num> Samples<F> {
     #[inline(always)]
     pub(in crate::step::collide) fn cells_under(&self, half: Vec3<F>) -> Cells<F> {
         let c = F::c;
+        // rounding of coordinates must not lose a cell
         let slack = self.extent * c(8.0 * F::Real::EPSILON);
         let (mut first, mut counts) = ([c(0.0); 2], [c(0.0); 2]);
         for axis in 0..2 {
             let (place, reach) = (self.place(axis), half[axis] + slack);
             let inverse = self.lattice.inverse[axis];
+            // first and last cell under the box, in the field; the count is 0 where the box is beside it
             let low = floor((place - reach) * inverse).max(c(0.0));
             let high = floor((place + reach) * inverse).min(self.cells[axis] - c(1.0));
             first[axis] = low;
@@ -148,6 +151,7 @@ impl<F: Num> Samples<F> {
         let c = F::c;
         let mut tile = [c(0.0); 2];
         for (axis, tile) in tile.iter_mut().enumerate() {
+            // the cell under the centre, in the field; half a cell keeps its tile clear of rounding
             let cell = floor(self.place(axis) * self.lattice.inverse[axis]);
             let cell = cell.max(c(0.0)).min(self.cells[axis] - c(1.0));
             *tile = floor((cell + c(0.5)) * c(1.0 / TILE as f64));
@@ -165,6 +169,7 @@ impl<F: Num> Samples<F> {
         let mut cell = [zero; 2];
         let mut share = [zero; 2];
         for axis in 0..2 {
+            // the cell of the place, in the field, and where it is in that cell, from 0 to 1
             let last = self.cells[axis] - one;
             let inverse = self.lattice.inverse[axis];
             let near = floor((self.place(axis) + way[axis]) * inverse);
@@ -175,6 +180,7 @@ impl<F: Num> Samples<F> {
         // rounding may put a place just beyond its cell
         let slack = c(64.0 * F::Real::EPSILON) * self.cells[0].max(self.cells[1]);
         let beyond = u.min(v).lt(-slack) | (one + slack).lt(u.max(v));
+        // elevations at P, Q and K; left of the diagonal K is the upper left corner
         let is_left = u.lt(v);
         let samples = self.cells[0] + one;
         let at = cell[1].fma(samples, cell[0] + self.first);
@@ -182,6 +188,7 @@ impl<F: Num> Samples<F> {
         let p = cx.pick(heights, at, 0);
         let q = cx.pick(heights, at + samples + one, 0);
         let k = cx.pick(heights, at + F::select(is_left, samples, one), 0);
+        // linear over the triangle: p + (k - p) to_k + (q - k) to_q
         let (to_k, to_q) = (F::select(is_left, v, u), F::select(is_left, u, v));
         let h = (k - p).fma(to_k, (q - k).fma(to_q, p));
         F::select(beyond, c(-1e18), self.height(h))
@@ -223,6 +230,7 @@ impl<F: Num> Samples<F> {
         k: F,
         size: F,
     ) -> [Prism<F>; 2] {
+        // both prisms share P and Q, the ends of the diagonal
         let (cell, one) = (self.cell(cells, k), F::c(1.0));
         let (heights, samples): (Fixed, F) = (self.tables.heights, self.cells[0] + one);
         let p = cx.pick(heights, cell.at, 0);
@@ -245,6 +253,7 @@ impl<F: Num> Samples<F> {
         size: F,
     ) -> Prism<F> {
         let (half, one) = (F::c(0.5), F::c(1.0));
+        // even prisms are the upper left ones
         let place = floor(k * half);
         let is_left = (k - (place + place)).lt(half);
         let cell = self.cell(cells, place);
@@ -265,6 +274,7 @@ impl<F: Num> Samples<F> {
         size: F,
     ) -> Prism<F> {
         let (c, one) = (F::c, F::c(1.0));
+        // P is the lowest corner along x and y, Q the highest, K one of the other two
         let (x, y) = (self.line(0, cell.column), self.line(1, cell.row));
         let (u, v) = (
             self.line(0, cell.column + one),

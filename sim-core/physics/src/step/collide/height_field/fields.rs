@@ -117,10 +117,12 @@ impl<F: Num> Body<'_, F> {
 fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) {
     let (scalars, indices) = (t.handles.pair_numbers, t.handles.pair_indices);
     let (poses, origins) = (t.memory.poses, t.memory.origins);
+    // the field is the first shape of the pair, and static
     let a = cx.index(indices, p, pair::SOLID_A, poses.rows);
     let b = cx.index(indices, p, pair::SOLID_B, poses.rows);
     let origin = cx.index(indices, p, pair::ORIGIN_B, origins.rows);
     let frame = axes_of(cx, poses, a);
+    // reference point and centre of the shape in the axes of the field
     let origin = load_vec3(cx, origins, origin, 0);
     let center = load_vec3(cx, poses, b, 9);
     let at = cx.index(indices, p, pair::HULL_A, t.fields.sizes.rows);
@@ -131,6 +133,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         frame.transpose_mul(origin),
         frame.transpose_mul(center),
     );
+    // axes of the shape in those of the field
     let shape_axes = axes_of(cx, poses, b);
     let axes = Mat3([
         frame.transpose_mul(shape_axes[0]),
@@ -140,10 +143,12 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
     let shape = Shape::read(cx, t, N::KIND, p, pair::SIZE_B, pair::HULL_B);
     let size = cx.constant(scalars, p, pair::SMALLER);
     let margin = cx.constant(scalars, p, pair::REACH) + contact_slack(size);
+    // reaches along the normals of sides, which all prisms share: computed once for the pair
     let reach = FieldReach {
         half: N::half_extents(shape.half_extents(), &axes),
         across: N::reach(shape.half_extents(), axes.transpose_mul(samples.across())),
     };
+    // bounding box with the margin; cells under it, and the tests of step 1
     let mut half = reach.half;
     for x in half.iter_mut() {
         *x = *x + margin;
@@ -153,6 +158,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
     let near = (-half[2]).lt(ceiling) & samples.lowest().lt(half[2]);
     let count = cells.count();
     when!(cx, near & C::F::c(0.5).lt(count), {
+        // prisms are in the axes of the field from the centre of the shape, which is the first one here
         let ground = ShapePose {
             axes: frame,
             center: Vec3::zero(),
@@ -167,6 +173,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             clip_tables: t.memory.cut,
             two_point_capsule_boxes: false,
         };
+        // steps 2 and 3: the list of prisms
         let mut out = points_of::<C>(cx, t, p, center, origin);
         let mut candidate_points = candidates(cx, t.memory.field_candidates, &out);
         let body = Body {
@@ -177,16 +184,19 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             margin,
         };
         let listed = near_prisms::<C, N>(cx, t, p, (&samples, &cells, size), &body);
+        // step 4: each prism of the list adds candidates
         let table = t.memory.field_prisms;
         each!(cx, at in listed, {
             let number = cx.load(table, at, 0);
             let prism = samples.prism(cx, &cells, number, size);
             N::contacts(cx, &shapes, &axes, &prism, &mut candidate_points);
         });
+        // prisms and candidates beyond their lists count as contacts left out
         let (none, full) = (C::F::c(0.0), C::F::c(FIELD_CANDIDATES as f64));
         let prisms = (cx.pushed(&listed) - full).max(none);
         let over = prisms + (cx.pushed(&candidate_points.list) - full).max(none);
         out.room.leave_out(cx, over);
+        // step 5: all candidates, or those that span most
         keep(cx, &candidate_points, size, &mut out);
     });
 }
@@ -202,6 +212,7 @@ fn near_prisms<C: Cx, N: FieldNarrow>(
     (samples, cells, size): (&Samples<C::F>, &Cells<C::F>, C::F),
     body: &Body<C::F>,
 ) -> C::List {
+    // step 2: cells with a corner above the lowest point of the shape, as many as this world has
     let zero = cx.at(0);
     let most = cx.index(t.fields.cells, p, 0, t.fields.cells_max + 1);
     let count = cells.count();
@@ -215,6 +226,7 @@ fn near_prisms<C: Cx, N: FieldNarrow>(
             cx.init(high_cells, row, 0, number);
         });
     });
+    // step 3: prisms of these cells that a few axes do not separate from the shape
     let mut listed = cx.list(FIELD_CANDIDATES);
     each!(cx, at in high, {
         let cell = cx.load(high_cells, at, 0);
@@ -263,6 +275,7 @@ fn keep<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Points<
         .lt(c(FIELD_CONTACTS as f64 + 0.5));
     let table = candidates.table;
     when!(cx, few, {
+        // few: all, in the order in which they were found
         each!(cx, at in candidates.list, {
             let contact = Candidate::read(cx, table, at);
             contact.add(cx, few, out);
@@ -343,8 +356,10 @@ impl<C: Cx> Best<C> {
 #[inline(always)]
 fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Points<C>) {
     let (c, table) = (C::F::c, candidates.table);
+    // lengths count by the radius of the shape
     let scale = c(1.0).div(size * size);
     let inverse = c(1.0).div(size);
+    // scores begin above any squared distance: the deepest wins first, and later minima do not depend on them
     let mut best = Best::none(cx);
     each!(cx, at in candidates.list, {
         let contact = Candidate::read(cx, table, at);
@@ -353,6 +368,7 @@ fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Po
         best.offer(cx, &contact, score);
     });
     times!(cx, i in FIELD_CONTACTS, {
+        // farthest points: keep the best, then lower each score to the distance from it
         let (kept, is) = best.read(cx);
         kept.add(cx, is, out);
         // the last one needs no successor
@@ -362,6 +378,7 @@ fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Po
         cx.set(&mut best.score, c(SPREAD));
         each!(cx, at in candidates.list, {
             let other = Candidate::read(cx, table, at);
+            // squared distance in place, by the radius, and in normal
             let (way, turn) = (other.place - kept.place, other.normal - kept.normal);
             let apart = way.dot(way).fma(scale, turn.dot(turn));
             let score = cx.load(table, at, SCORE).min(apart);

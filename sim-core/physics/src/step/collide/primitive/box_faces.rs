@@ -71,6 +71,7 @@ impl<F: Num> FacePair<F> {
         let Vec3([v0, v1, v2]) = cycle_components(f, v);
         let Vec3([n0, n1, n2]) = cycle_components(f, n * side);
         let Vec3([g0, g1, g2]) = cycle_components(f, other);
+        // its centre lies g0 against the normal from that of its box; heights count from the reference face
         let down = sign(n0) * g0;
         FacePair {
             sides: [hu, hv],
@@ -98,6 +99,7 @@ impl<F: Num> FacePair<F> {
     pub fn add_clipped<C: Cx<F = F>>(&self, cx: &mut C, margin: F, out: &mut Points<C>) {
         let c = F::c;
         let one = c(1.0);
+        // the reference rectangle a little larger, the incident one a little smaller, so equal faces agree
         let [hu, hv] = self.sides;
         let rounding = F::Real::EPSILON;
         let wider = c(INCLUSIVE * rounding);
@@ -105,8 +107,10 @@ impl<F: Num> FacePair<F> {
         let (wide_u, wide_v) = (hu.fma(wider, hu), hv.fma(wider, hv));
         let [e1, e2] = self.edges;
         let middle = self.middle;
+        // an incident edge is start + t run with |t| ≤ 1, at either end of the other direction
         for (across, run, sense) in [(e2, e1, -1.0), (e1, e2, 1.0)] {
             let (x, y) = (reciprocal(run[0]), reciprocal(run[1]));
+            // |start + t run| ≤ side along u and v bounds t; no interval is left where low ≥ high
             let (wx, wy) = (wide_u * x.abs(), wide_v * y.abs());
             for s in [-1.0, 1.0] {
                 let start = across.scale_add(c(s), middle);
@@ -121,6 +125,7 @@ impl<F: Num> FacePair<F> {
                 };
                 let is_cut = inside & is_cut;
                 let (enter, leave) = (run.scale_add(enter, start), run.scale_add(leave, start));
+                // candidates count up to the margin above the reference face
                 self.add(cx, inside & enter[2].lt(margin), enter, out);
                 self.add(cx, is_cut & leave[2].lt(margin), leave, out);
             }
@@ -128,6 +133,7 @@ impl<F: Num> FacePair<F> {
         // corners of the reference face in the coordinates of the incident one (Cramer's rule)
         let inverse = one.div(e1[1].fnma(e2[0], e1[0] * e2[1]));
         for (x, y) in [(-hu, -hv), (hu, -hv), (-hu, hv), (hu, hv)] {
+            // a corner counts inside the incident face, at the height of that face above it
             let (dx, dy) = (x - middle[0], y - middle[1]);
             let along1 = dy.fnma(e2[0], dx * e2[1]) * inverse;
             let along2 = dx.fnma(e1[1], dy * e1[0]) * inverse;

@@ -65,11 +65,13 @@ fn size<F: Num>(a: Vec3<F>, b: Vec3<F>) -> F {
 pub fn box_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (half_a, half_b, margin) = (pair.a.half_extents(), pair.b.half_extents(), pair.margin);
     let faces = FaceAxis::find(pair);
+    // boxes apart along a face axis end here, before the nine edge axes
     when!(cx, !margin.lt(faces.separation), {
         let edge = EdgeAxis::find(&faces, half_a, half_b);
         // separation × √square against the margin, both squared
         let far = (margin * margin * edge.square).lt(edge.score);
         when!(cx, !far, {
+            // faces make up to eight points, edges one; worlds of a block may need either
             let best = best_axis(&faces, &edge, half_a, half_b);
             when!(cx, !best.edge, {
                 FacePair::from_axis(pair, &best).add_clipped(cx, margin, out);
@@ -100,6 +102,7 @@ impl<F: Num> FaceAxis<F> {
         let c = F::c;
         let (axes_a, b) = (pair.axes_a, pair.pose_b);
         let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
+        // aᵢ · bⱼ and |aᵢ · bⱼ|
         let mut cosines = Mat3::zero();
         let mut widths = cosines;
         for i in 0..3 {
@@ -108,8 +111,10 @@ impl<F: Num> FaceAxis<F> {
                 widths[i][j] = cosines[i][j].abs();
             }
         }
+        // c in the axes of both boxes
         let in_a = axes_a.transpose_mul(b.center);
         let in_b = b.axes.transpose_mul(b.center);
+        // faces of A: |c · aᵢ| - hₐᵢ - Σ h_b |aᵢ · bⱼ|; of equals the first is kept
         let (mut first, mut code) = (c(-1e9), c(0.0));
         for i in 0..3 {
             let x = in_a[i].abs() - half_a[i] - half_b.dot(widths[i]);
@@ -117,6 +122,7 @@ impl<F: Num> FaceAxis<F> {
             first = F::select(better, x, first);
             code = F::select(better, c(i as f64), code);
         }
+        // faces of B: |c · bⱼ| - h_bⱼ - Σ hₐ |aᵢ · bⱼ|
         let (mut second, mut code_b) = (c(-1e9), c(0.0));
         for j in 0..3 {
             let x = in_b[j].abs()
@@ -126,6 +132,7 @@ impl<F: Num> FaceAxis<F> {
             second = F::select(better, x, second);
             code_b = F::select(better, c(3.0 + j as f64), code_b);
         }
+        // of parallel faces rounding would choose, so B must win by more than that
         let noise = size(half_a, half_b) * c(PREFER_FIRST * F::Real::EPSILON);
         let better = (first + noise).lt(second);
         FaceAxis {
@@ -163,12 +170,16 @@ impl<F: Num> EdgeAxis<F> {
             let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
             for j in 0..3 {
                 let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
+                // |aᵢ × bⱼ|² from the other two cosines: 1 - (aᵢ · bⱼ)² would cancel
                 let l = cosines[i1][j].fma(cosines[i1][j], cosines[i2][j] * cosines[i2][j]);
+                // |c · (aᵢ × bⱼ)| in the axes of A
                 let between = in_a[i1]
                     .fnma(cosines[i2][j], in_a[i2] * cosines[i1][j])
                     .abs();
+                // half widths of both boxes along it, and noise in favour of faces
                 let of_a = half_a[i1].fma(widths[i2][j], half_a[i2].fma(widths[i1][j], noise));
                 let of_b = half_b[j1].fma(widths[i][j2], half_b[j2].fma(widths[i][j1], of_a));
+                // x|x| keeps the sign, so separations compare without a root; parallel edges have no axis
                 let x = between - of_b;
                 let here = x * x.abs();
                 let better = c(parallel * parallel).lt(l) & (score * l).lt(here * square);
@@ -202,6 +213,7 @@ fn best_axis<F: Num>(
     let less = F::select(edge.score.lt(c(0.0)), -root, root);
     let noise = size(half_a, half_b) * c(PREFER_FACES * F::Real::EPSILON);
     let separation = (less + noise) * inverse;
+    // i and j of 3 i + j
     let first = F::select(
         c(5.5).lt(edge.code),
         c(2.0),
@@ -218,11 +230,14 @@ fn best_axis<F: Num>(
             Vec3([-column[1], column[0], c(0.0)]),
         ]),
     );
+    // of length 1, towards the centre of B
     let product = product * (inverse * sign(product.dot(faces.center[0])));
+    // cosine between edge axis and face axis: bⱼ in the axes of A is a column of cosines
     let of_b = c(2.5).lt(faces.code);
     let index = faces.code - F::select(of_b, c(3.0), c(0.0));
     let facing = column_at(index, columns);
     let along_face = F::select(of_b, product.dot(facing), component_at(index, product));
+    // an edge axis that is nearly the face axis must be better by more than a little (MuJoCo 3.17)
     let same = c(SAME_AXIS).lt(along_face.abs());
     let least = faces.separation.abs().fma(c(LITTLE), c(LEAST));
     let little = separation.lt(faces.separation + least);
@@ -251,6 +266,7 @@ fn add_edge_contact<C: Cx>(
     let c = C::F::c;
     let (axes_a, b) = (pair.axes_a, pair.pose_b);
     let (half_a, half_b) = (pair.a.half_extents(), pair.b.half_extents());
+    // the normal in the axes of both boxes
     let q = &best.cosines;
     let normal = best.product;
     let columns = transpose(q);
@@ -262,6 +278,7 @@ fn add_edge_contact<C: Cx>(
         a[k] = zero_at(best.pair[0], k, sign(normal[k]) * half_a[k]);
         other[k] = zero_at(best.pair[1], k, -(sign(normal_b[k]) * half_b[k]));
     }
+    // between these middles, and the distance of the lines along the normal
     let apart = columns.mul_add(Vec3(other), best.center[0]) - Vec3(a);
     let distance = apart.dot(normal);
     // a + x aᵢ and apart + y bⱼ: the shortest way between the lines, clamped to the edges one after the other
@@ -275,6 +292,7 @@ fn add_edge_contact<C: Cx>(
     let x = free.min(long_a).max(-long_a);
     let y = cosine.fma(x, -along_b).min(long_b).max(-long_b);
     let x = cosine.fma(y, along_a).min(long_a).max(-long_a);
+    // both closest points from the centre of A, and the middle between them
     let first = column_at(best.pair[0], *axes_a);
     let second = column_at(best.pair[1], b.axes);
     let on_a = first.scale_add(x, axes_a * Vec3(a));

@@ -95,15 +95,19 @@ pub(in crate::step::collide) fn two_point_capsule_box<C: Cx>(
         rise: axis.along * axis.half_height,
         half,
     };
+    // rounding of squared distances where the surfaces touch, at about the radius
     let size = half[0] + half[1] + half[2] + axis.half_height + radius;
     let rounding = size * radius * c(4.0 * <C::F as Num>::Real::EPSILON);
+    // the nearest feature: an end over a face or inside, or an edge or corner that is nearer
     let mut nearest = beside.nearest_end();
     beside.add_edges(&mut nearest, c(NEARER).max(rounding));
+    // the way to the second point from either kind of feature: worlds differ, so both are computed
     let is_end = nearest.kind.lt(c(0.5));
     let (from_end, of_end) = beside.way_from_end(&nearest);
     let (from_edge, of_edge) = beside.way_from_edge(&nearest);
     let exists = (is_end & of_end) | (!is_end & of_edge);
     let way = C::F::select(is_end, from_end, from_edge);
+    // from parts of the half axis to heights along it [m]
     let first = nearest.height * axis.half_height;
     let second = (nearest.height + way) * axis.half_height;
     // an axis through the box may be farther from each edge than the radius, so each sphere decides by itself
@@ -128,12 +132,14 @@ impl<F: Num> Beside<F> {
         for end in [-1.0, 1.0] {
             let at = self.rise.scale_add(F::c(end), self.middle);
             let apart = at - clamp_to_box(at, self.half);
+            // beyond no face an end is inside, beyond one over that face, beyond more nearest to an edge or corner
             let (mut planes, mut face) = (zero, -one);
             for k in 0..3 {
                 let beyond = self.half[k].lt(at[k].abs());
                 planes = planes + F::select(beyond, one, zero);
                 face = F::select(beyond, F::c(k as f64), face);
             }
+            // only ends inside or over a face count here
             let square = apart.dot(apart);
             let better = planes.lt(F::c(1.5)) & square.lt(nearest.square);
             let other = Nearest {
@@ -161,29 +167,35 @@ impl<F: Num> Beside<F> {
         for j in 0..3 {
             // of the other two axes the lower changes first, so that of equals MuJoCo's is taken
             let (u, v) = [(1, 2), (0, 2), (0, 1)][j];
+            // squared length of the axis across the edge; an axis along the edge is nearest to other features
             let across = h[u].fma(h[u], h[v] * h[v]);
             let crosses = !(half[j] * half[j] * across).lt(F::c(PARALLEL));
             let inverse = one.div(F::select(crosses, across, one));
             for (side_v, side_u) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                 let (side_u, side_v) = (F::c(side_u), F::c(side_v));
+                // seen along the edge: t = d · h / |h|², with d from the middle of the axis to the edge
                 let (du, dv) = (side_u.fma(half[u], -p[u]), side_v.fma(half[v], -p[v]));
                 let product = du.fma(h[u], dv * h[v]);
                 let height = product * inverse;
+                // past the end of the edge the corner counts, with the height where the axis is nearest to it
                 let free = height.fma(h[j], p[j]);
                 let past = half[j].lt(free.abs());
                 let on_edge = free.min(half[j]).max(-half[j]);
                 let of_corner = (on_edge - p[j]).fma(h[j], product) * inverse_square;
                 let height = F::select(past, of_corner, height);
+                // past an end of the axis that end counts, with its nearest place on the edge
                 let beyond = one.lt(height.abs());
                 let height = height.min(one).max(-one);
                 let of_end = height.fma(h[j], p[j]);
                 let past_again = beyond & half[j].lt(of_end.abs());
                 let along = F::select(beyond, of_end.min(half[j]).max(-half[j]), on_edge);
                 let corner = past | past_again;
+                // the edge or corner by its side of the centre along each axis
                 let mut side = Vec3::zero();
                 side[u] = side_u;
                 side[v] = side_v;
                 side[j] = sign(F::select(past_again, of_end, free));
+                // squared distance; an edge must be nearer than the features before it by more than rounding
                 let gap = [
                     height.fnma(h[u], du),
                     height.fnma(h[v], dv),
@@ -208,10 +220,12 @@ impl<F: Num> Beside<F> {
     #[inline(always)]
     fn way_from_end(&self, nearest: &Nearest<F>) -> (F, F::Mask) {
         let (zero, far) = (F::c(0.0), F::c(FAR));
+        // from this end towards the other one, 2 half axes away
         let back = -nearest.height;
         let at = self.rise.scale_add(nearest.height, self.middle);
         let mut way = F::c(2.0);
         for k in 0..3 {
+            // the part of the way to the plane of a face beside, which the axis heads for; the first plane ends it
             let step = self.rise[k] * back;
             let to = (sign(step) * self.half[k] - at[k]) * reciprocal(step);
             let is_face = (nearest.index - F::c(k as f64)).abs().lt(F::c(0.5));
@@ -233,12 +247,15 @@ impl<F: Num> Beside<F> {
         let mut inward = Vec3::zero();
         let mut widths = Vec3::zero();
         for k in 0..3 {
+            // how far half the axis runs along k, and the part of it that crosses half the box
             beside[k] = zero_at(across, k, h[k].abs());
             widths[k] = half[k] * reciprocal(h[k]).abs();
+            // 1 where the upper half of the axis leads from this side over the box
             let up = F::select(zero.lt(h[k]), one, -one);
             let leaves = (up * nearest.side[k]).lt(zero);
             inward[k] = zero_at(across, k, F::select(leaves, one, zero));
         }
+        // the component in which the axis runs fastest decides which way is over the box
         let longest = largest_axis(beside);
         let main = component_at(longest, inward);
         if <F::Real as Real>::EPSILON > SINGLE {
@@ -249,16 +266,19 @@ impl<F: Num> Beside<F> {
                 inward[k] = F::select(h[k].abs().lt(noise), flat, inward[k]);
             }
         }
+        // where all lead alike, the axis passes the feature; over an edge exactly one leads over the box
         let count = inward[0] + inward[1] + inward[2];
         let single = count.lt(F::c(1.5));
         let exists = F::c(0.5).lt(count) & count.lt(F::c(2.5));
 
         // over an edge: towards the face that the axis is above, and no farther than that face reaches
         let up = F::select(F::c(0.5).lt(main), one, -one);
+        // to the end of the edge that this way heads for
         let slope = component_at(nearest.index, h);
         let rises = F::select(zero.lt(slope), one, -one) * up;
         let edge_half = component_at(nearest.index, half);
         let to_end = rises.fnma(nearest.along, edge_half) * reciprocal(slope).abs();
+        // the way ends at the end of the axis, past the face, or at the end of the edge
         let width = two * component_at(longest, widths);
         let from_edge = up * up.fnma(nearest.height, one).min(width).min(to_end);
 
@@ -271,6 +291,7 @@ impl<F: Num> Beside<F> {
             others[k] = F::select(F::c(0.5).lt(is_odd), F::c(FAR), widths[k]);
         }
         let up = F::select(single, one, -one);
+        // steeper than 45° along the odd axis: along that edge; else over the face across it
         let steep = component_at(odd, h);
         let along_edge = h.dot(h).lt(two * steep * steep);
         let (_, width) = min_component(others);

@@ -42,6 +42,7 @@ pub fn capsule_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
     let (axes_a, b) = (pair.axes_a, pair.pose_b);
     let (half_height_a, half_height_b) = (pair.a.half_height(), pair.b.half_height());
     let (a, d, center) = (axes_a[2], b.axes[2], b.center);
+    // c along both axes, and their common perpendicular a × d
     let (along_a, along_b) = (a.dot(center), d.dot(center));
     let cosine = a.dot(d);
     let product = a.cross(d);
@@ -57,10 +58,11 @@ pub fn capsule_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
         add_balls(cx, pair, [a * x, d.scale_add(y, center)], out);
     });
     when!(cx, parallel, {
-        // each end of the overlap is an end of one axis, and the nearest point of the other
+        // each end of the overlap is an end of one axis, and the nearest point of the other; B reaches h |cos| along A
         let reach = half_height_b * cosine.abs();
         for side in [-1.0, 1.0] {
             let end_b = c(side).fma(reach, along_a);
+            // the end of B if it lies beside A, else the end of A on that side
             let of_b = end_b.abs().lt(half_height_a);
             let end_a = end_b.min(half_height_a).max(-half_height_a);
             let y = clamped_height(cosine, end_a, -along_b, half_height_b);
@@ -104,6 +106,7 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
     let c = C::F::c;
     let (b, half) = (pair.pose_b, pair.b.half_extents());
     let (radius, half_height) = (pair.a.radius(), pair.a.half_height());
+    // the axis in the frame of the box
     let axis = CapsuleAxis {
         middle: (b.axes.transpose_mul(b.center) * c(-1.0)),
         along: b.axes.transpose_mul(pair.axes_a[2]),
@@ -112,6 +115,7 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
     if pair.two_point_capsule_boxes {
         return two_point_capsule_box(cx, pair, &axis, out);
     }
+    // the sphere at the nearest point decides whether they touch, and over which face or edge
     let size = half[0] + half[1] + half[2] + half_height + radius;
     let nearest = axis.nearest_to_box(half);
     let exit = BoxExit::find(axis.at(nearest), half);
@@ -125,8 +129,10 @@ pub fn capsule_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<
         let at_high = !at_low & (high - nearest).abs().lt(close);
         let low = C::F::select(at_low, nearest, low);
         let high = C::F::select(at_high, nearest, high);
+        // ends that are close together make one point, the nearest
         let two = (low + close).lt(high);
         let low = C::F::select(two, low, nearest);
+        // a nearest point between both ends, and nearer than they are, is a third one
         let first = BoxExit::find(axis.at(low), half).distance;
         let second = BoxExit::find(axis.at(high), half).distance;
         let nearer =
@@ -181,6 +187,7 @@ impl<F: Num> CapsuleAxis<F> {
     #[inline(always)]
     fn nearest_to_box(&self, half: Vec3<F>) -> F {
         let zero = F::c(0.0);
+        // the bracket of the root, and the derivative at its ends
         let (mut low, mut high) = (-self.half_height, self.half_height);
         let mut below = self.slope(low, half);
         let mut above = self.slope(high, half);
@@ -188,6 +195,7 @@ impl<F: Num> CapsuleAxis<F> {
         let starts = below.lt(zero);
         let ends = zero.lt(above);
         for k in 0..3 {
+            // each bend between the ends becomes a bound of the bracket, lower where the distance still falls
             let inverse = reciprocal(self.along[k]);
             for face in [-half[k], half[k]] {
                 let height = ((face - self.middle[k]) * inverse).min(highest).max(lowest);
@@ -201,6 +209,7 @@ impl<F: Num> CapsuleAxis<F> {
                 above = F::select(down, here, above);
             }
         }
+        // linear between two bends: the secant meets the root; without a change of sign an end is nearest
         let rise = above - below;
         let part = (-below).div(F::select(zero.lt(rise), rise, F::c(1.0)));
         let root = part.min(F::c(1.0)).max(zero).fma(high - low, low);
@@ -219,6 +228,7 @@ impl<F: Num> CapsuleAxis<F> {
     fn clip_over(&self, normal: Vec3<F>, half: Vec3<F>) -> (F, F) {
         let (mut low, mut high) = (-self.half_height, self.half_height);
         for k in 0..3 {
+            // only faces that the normal is across bound the part: |p + t d| ≤ half
             let beside = normal[k].abs().lt(F::c(PARALLEL));
             let inverse = reciprocal(self.along[k]);
             let middle = -(self.middle[k] * inverse);
@@ -227,6 +237,7 @@ impl<F: Num> CapsuleAxis<F> {
             low = F::select(beside, low.max(middle - reach), low);
             high = F::select(beside, high.min(middle + reach), high);
         }
+        // both within the axis, in order, also where no part is left
         let low = low.min(self.half_height).max(-self.half_height);
         (low, high.min(self.half_height).max(low))
     }
@@ -245,6 +256,7 @@ fn capsule_in_box<C: Cx>(
     let c = C::F::c;
     let half = pair.b.half_extents();
     let (p, d, h) = (axis.middle, axis.along, axis.half_height);
+    // face axes: |p · eₖ| - hₖ - h |d · eₖ|
     let (mut face, mut index) = (c(-1e9), c(0.0));
     for k in 0..3 {
         let x = p[k].abs() - half[k] - h * d[k].abs();
@@ -256,9 +268,11 @@ fn capsule_in_box<C: Cx>(
     let (mut score, mut square, mut across) = (face, c(1.0), c(-1.0));
     for k in 0..3 {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        // |p · (d × eₖ)| less the half width of the box; the axis itself has none across d
         let l = d[i].fma(d[i], d[j] * d[j]);
         let x = d[i].fnma(p[j], d[j] * p[i]).abs() - half[i].fma(d[j].abs(), half[j] * d[i].abs());
         let parallel = l.lt(c(PARALLEL_EDGE));
+        // faces are preferred by the noise, before division by the length
         let length = C::F::select(parallel, c(1.0), l).sqrt();
         let x = (x - noise).div(length);
         let better = !parallel & score.lt(x);
@@ -285,6 +299,7 @@ fn leave_through_face<C: Cx>(
     out: &mut Points<C>,
 ) {
     let (c, half) = (C::F::c, pair.b.half_extents());
+    // the outward normal of the face, and the part of the axis over it
     let side = sign(component_at(index, axis.middle));
     let direction = Vec3([
         only_at(index, 0, side),
@@ -300,6 +315,7 @@ fn leave_through_face<C: Cx>(
         C::F::select(falls, low, high),
     );
     for (height, mask) in [(low, two | !two), (high, two)] {
+        // the ball leaves along the normal of the face, also where another face is nearer
         let at = axis.at(height);
         let distance = direction.dot(at) - component_at(index, half);
         let exit = BoxExit {
@@ -323,6 +339,7 @@ fn leave_over_edge<C: Cx>(
 ) {
     let (zero, half) = (C::F::c(0.0), pair.b.half_extents());
     let (p, d, h) = (axis.middle, axis.along, axis.half_height);
+    // d × eₖ, of length 1, from the centre of the box to the axis
     let product = column_at(
         across,
         Mat3([
@@ -339,6 +356,7 @@ fn leave_over_edge<C: Cx>(
         corner[k] = zero_at(across, k, sign(direction[k]) * half[k]);
         flat[k] = zero_at(across, k, d[k]);
     }
+    // where the axis is nearest to the edge, and how far it is from there along the direction
     let to = flat.dot(corner - p).div(square);
     let at = axis.at(to.min(h).max(-h));
     let distance = direction.dot(at - corner);

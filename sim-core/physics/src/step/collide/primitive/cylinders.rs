@@ -28,6 +28,7 @@ pub fn sphere_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
     let c = C::F::c;
     let (zero, one) = (c(0.0), c(1.0));
     let (b, radius) = (pair.pose_b, pair.a.radius());
+    // the centre of the sphere in the cylinder's axes, and the radial direction to it
     let Vec3([x, y, z]) = -b.axes.transpose_mul(b.center);
     let width = x.fma(x, y * y).sqrt();
     // on the axis any direction across it is as good
@@ -49,10 +50,12 @@ pub fn sphere_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
         C::F::select(outside, out_r * inverse, C::F::select(over, zero, one)),
         C::F::select(outside, out_z * inverse, C::F::select(over, one, zero)),
     );
+    // distance of the centre from the cylinder, negative inside; the normal points back to the cylinder
     let core = C::F::select(outside, length, beside.max(above));
     let normal = [-(rx * radial), -(ry * radial), with_sign(-axial, z)];
     let normal = b.axes * Vec3(normal);
     let distance = core - radius;
+    // along the normal the surfaces are at the radius and at `core`
     let point = normal * ((radius + core) * c(0.5));
     out.add(cx, distance.lt(pair.margin), point, distance, normal);
 }

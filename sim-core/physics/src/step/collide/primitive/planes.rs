@@ -37,6 +37,7 @@ fn add_plane_contact<C: Cx>(
 /// Adds the contact of a sphere with the plane.
 #[inline(always)]
 fn add_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, center: Vec3<C::F>, out: &mut Points<C>) {
+    // the lowest point of the sphere, at n · c - r
     let (normal, radius) = (pair.axes_a[2], pair.b.radius());
     let distance = normal.dot(center) - radius;
     let at = normal.scale_add(-radius, center);
@@ -57,6 +58,7 @@ pub fn plane_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Point
     if out.along.is_some() {
         out.along = Some(b.axes[2]);
     }
+    // each end of the axis carries a sphere
     for half in [half_height, -half_height] {
         let end = b.axes[2].scale_add(half, b.center);
         add_sphere(cx, pair, end, out);
@@ -67,6 +69,7 @@ pub fn plane_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Point
 #[inline(always)]
 pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (normal, b, half) = (pair.axes_a[2], pair.pose_b, pair.b.half_extents());
+    // height of the centre, and half edges: a corner is the centre plus or minus each of them
     let height = normal.dot(b.center);
     let x = b.axes[0] * half[0];
     let y = b.axes[1] * half[1];
@@ -103,6 +106,7 @@ pub fn plane_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poin
     let upright = sine.lt(c(upright::<C::F>()));
     let unit = c(1.0).div(C::F::select(upright, c(1.0), sine));
     let rim = select(upright, b.axes[0], across * unit) * radius;
+    // corners of the triangle are at -rim/2 ± side, with |side| = √3/2 r
     let side = down.cross(rim) * c(SIDE);
     let lower_cap = down.scale_add(half_height, b.center);
     let upper_cap = down.scale_add(-half_height, b.center);

@@ -31,6 +31,7 @@ pub fn add_sphere_sphere<C: Cx>(
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let nothing = C::F::c(COINCIDENT * COINCIDENT);
+    // the normal is along the line of both centres
     let between = b.center - a.center;
     let apart = nothing.lt(between.dot(between));
     // any normal will do where centres coincide
@@ -69,6 +70,7 @@ pub fn sphere_sphere<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Point
 #[inline(always)]
 pub fn sphere_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (b, half_height) = (pair.pose_b, pair.b.half_height());
+    // foot of the centre on the axis of the capsule, clamped to its ends
     let along = (-b.axes[2].dot(b.center))
         .min(half_height)
         .max(-half_height);
@@ -83,8 +85,10 @@ pub fn sphere_capsule<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poin
 #[inline(always)]
 pub fn sphere_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
     let (b, margin) = (pair.pose_b, pair.margin);
+    // centre of the sphere in the axes of the box
     let center = b.axes.transpose_mul(b.center) * C::F::c(-1.0);
     let exit = BoxExit::find(center, pair.b.half_extents());
+    // nothing is less than itself: a mask that holds in every world
     let always = !margin.lt(margin);
     add_sphere_box(cx, pair, always, center, &exit, out);
 }
@@ -128,11 +132,13 @@ impl<F: Num> BoxExit<F> {
     #[inline(always)]
     pub fn find(point: Vec3<F>, half: Vec3<F>) -> BoxExit<F> {
         let (zero, one) = (F::c(0.0), F::c(1.0));
+        // outside: from the nearest point of the box; inside, this is 0
         let apart = point - clamp_to_box(point, half);
         let square = apart.dot(apart);
         let outside = zero.lt(square);
         let length = square.sqrt();
         let inverse = one.div(F::select(outside, length, one));
+        // inside: depth below each face, and the least of them
         let depths = Vec3([
             half[0] - point[0].abs(),
             half[1] - point[1].abs(),
