@@ -82,6 +82,7 @@ impl<C: Cx> Shape<C> {
     pub fn bounding_box(&self, kind: Kind) -> Vec3<C::F> {
         let Vec3([x, y, _]) = self.size;
         match kind {
+            // a cylinder's size is its radius and its half height
             Kind::Cylinder => Vec3([x, x, y]),
             _ => self.size,
         }

@@ -37,6 +37,7 @@ impl Stage for Poses {
             // the rotation of the joint follows; a free or mocap body has its orientation in the world
             w.orientation[k] = match body.motion {
                 Motion::Revolute => {
+                    // (0, 0, sin q/2, cos q/2) from the right
                     let half = cx.get(&b.joint_q[body.coord]) * C::F::c(0.5);
                     let (sin, cos) = half.sincos();
                     turn_z(carried, sin, cos)

@@ -165,6 +165,7 @@ pub(in crate::step) fn velocity<F: Num>(
 ) -> Spatial<F> {
     match mount.body {
         Some(body) => {
+            // v + ω × p, with v at the reference point of the robot
             let Spatial([linear, angular]) = w.velocity[body];
             Spatial([linear + angular.cross(position), angular])
         }
@@ -179,6 +180,7 @@ pub fn axes<F: Num>(w: &Workspace<F>, mount: &Mount<F::Real>) -> Mat3<F> {
     match mount.body {
         Some(body) => {
             let carrier = &w.rotation[body];
+            // R A, column by column
             Mat3([carrier * local[0], carrier * local[1], carrier * local[2]])
         }
         None => local,
@@ -194,6 +196,7 @@ pub(in crate::step) fn to_local<F: Num>(
 ) -> Vec3<F> {
     let local = Mat3::constant(mount.rotation);
     match mount.body {
+        // Aᵀ Rᵀ v: from the world to the body, then to the mount
         Some(body) => local.transpose_mul(w.rotation[body].transpose_mul(vector)),
         None => local.transpose_mul(vector),
     }

@@ -86,6 +86,7 @@ fn com_velocity<F: Num, V>(
     let w = &b.work;
     match body.frame.body {
         Some(carrier) => {
+            // v + ω × c(root) and ω
             let velocity = w.velocity[carrier];
             let center = root_center(m, b, body);
             Spatial([

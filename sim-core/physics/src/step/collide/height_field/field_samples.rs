@@ -156,6 +156,7 @@ impl<F: Num> Samples<F> {
             let cell = cell.max(c(0.0)).min(self.cells[axis] - c(1.0));
             *tile = floor((cell + c(0.5)) * c(1.0 / TILE as f64));
         }
+        // tiles are in rows along x
         let at = self.tiles[0] + tile[1].fma(self.tiles[1], tile[0]);
         let h = cx.pick(self.tables.ceilings, at, 0);
         self.height(h)

@@ -106,6 +106,7 @@ impl<F: Num> Body<'_, F> {
     #[inline(always)]
     fn is_near<N: FieldNarrow>(&self, prism: &Prism<F>) -> F::Mask {
         let [p, q, k] = prism.top;
+        // a prism whose corners all lie below the shape cannot touch it
         let reaches = self.lowest.lt(p[2].max(q[2]).max(k[2]));
         let gap = N::gap(self.size, self.axes, prism, &self.reach);
         reaches & gap.lt(self.margin)
@@ -254,6 +255,7 @@ fn candidates<C: Cx>(cx: &mut C, table: Table, out: &Points<C>) -> Points<C> {
         pair: out.pair,
         base: out.base,
         flip: -out.flip,
+        // candidates take no room, and friction and tangents come with the contacts that are kept
         mu: None,
         along: None,
         room: Room {

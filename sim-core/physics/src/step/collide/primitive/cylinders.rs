@@ -40,6 +40,7 @@ pub fn sphere_cylinder<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Poi
     );
     // distances from the side and from the cap
     let (beside, above) = (width - pair.b.radius(), z.abs() - pair.b.half_height());
+    // outside, the way from the nearest point of the cylinder, along r and z
     let (out_r, out_z) = (beside.max(zero), above.max(zero));
     let length = out_r.fma(out_r, out_z * out_z).sqrt();
     let outside = c(1e-12).lt(length);

@@ -273,6 +273,7 @@ fn records<C: Cx>(
             // the total also counts contacts for which no slot is left
             let more = cx.get(&total) + C::F::select(is_found, C::F::c(1.0), zero);
             cx.set(&mut total, more);
+            // the record and its key; a contact that does not count has the key of an empty slot and stays out
             let mut carried = [C::F::select(is_found, key, C::F::c(EMPTY)); SLOT];
             carried[..RECORD].copy_from_slice(&record(&contact));
             // insertion: what a slot loses goes on to the next one
