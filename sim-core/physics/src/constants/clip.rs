@@ -3,7 +3,7 @@
 use super::hull::CORNERS_MAX;
 use crate::lane::Table;
 
-/// Scratch tables of a pair; see `step/collide/clip.rs`.
+/// Scratch tables of a pair; see `step/collide/manifold/clip.rs`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
     /// Corners of both faces across and along the normal (2 × 3), and the second's edges as half-planes (3).

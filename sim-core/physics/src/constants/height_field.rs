@@ -2,7 +2,7 @@
 
 use crate::lane::Fixed;
 
-/// Contacts that a pair of a height field and another shape keeps. Of more, these span most; see `step/collide/fields.rs`.
+/// Contacts that a pair of a height field and another shape keeps. Of more, these span most; see `step/collide/height_field/fields.rs`.
 pub const FIELD_CONTACTS: usize = 8;
 
 /// Most candidates of such a pair, before that choice, and most prisms that it looks at closely: later ones are left out.
