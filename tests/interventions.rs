@@ -185,7 +185,7 @@ fn many_worlds_equal_runs_of_one_or_some_of_them_in_any_order() {
                 lanes: case.dice.pick(&lanes(case.options.precision)),
                 ..case.options.clone()
             };
-            let ops: Vec<Op> = ops.iter().map(|op| op.of(&chosen)).collect();
+            let ops: Vec<Op> = ops.iter().map(|op| op.for_worlds(&chosen)).collect();
             let run = Run::new(&case.model, options);
             let some = play_on(run, &ops, Kept::new(), &all.restored)?;
             for (its, &world) in chosen.iter().enumerate() {

@@ -10,7 +10,7 @@ use crate::errors::raise;
 
 /// A real number of an observation.
 trait Number: Element + Copy + PartialOrd {
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
     fn within(self, low: Self, high: Self) -> Self;
     fn is_nan(self) -> bool;
 }
@@ -18,7 +18,7 @@ trait Number: Element + Copy + PartialOrd {
 macro_rules! number {
     ($($real:ty)*) => {
         $(impl Number for $real {
-            fn of(x: f64) -> $real {
+            fn from_f64(x: f64) -> $real {
                 x as $real
             }
             fn within(self, low: $real, high: $real) -> $real {
@@ -129,8 +129,12 @@ fn place<T: Element + Copy, O: Number>(
     let rows = out
         .chunks_exact_mut(size)
         .map(|row| &mut row[columns.clone()]);
-    let put =
-        |x: T, k: usize| O::of(real(x)).within(O::of(f64::from(low[k])), O::of(f64::from(high[k])));
+    let put = |x: T, k: usize| {
+        O::from_f64(real(x)).within(
+            O::from_f64(f64::from(low[k])),
+            O::from_f64(f64::from(high[k])),
+        )
+    };
     let is_free =
         low.iter().all(|&x| x == f32::NEG_INFINITY) && high.iter().all(|&x| x == f32::INFINITY);
     if is_free {
@@ -138,12 +142,12 @@ fn place<T: Element + Copy, O: Number>(
             match from.as_slice() {
                 Some(from) => {
                     for (to, x) in to.iter_mut().zip(from) {
-                        *to = O::of(real(*x));
+                        *to = O::from_f64(real(*x));
                     }
                 }
                 None => {
                     for (to, x) in to.iter_mut().zip(from) {
-                        *to = O::of(real(*x));
+                        *to = O::from_f64(real(*x));
                     }
                 }
             }

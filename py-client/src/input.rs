@@ -129,7 +129,7 @@ enum Array<'py> {
 
 impl<'py> Array<'py> {
     /// The array itself, if it is of floats and contiguous.
-    fn of(value: &Bound<'py, PyAny>) -> Option<Array<'py>> {
+    fn from_value(value: &Bound<'py, PyAny>) -> Option<Array<'py>> {
         if let Ok(array) = value.cast::<PyArrayDyn<f32>>() {
             let array = array.is_c_contiguous().then(|| array.try_readonly().ok());
             array?.map(Array::F32)
@@ -171,8 +171,8 @@ impl InputTable {
             let name: &str = name.extract()?;
             let is_ready = || {
                 let row = self.row(name)?;
-                let whole =
-                    Array::of(&value).filter(|array| array.shape() == row.shape(self.worlds));
+                let whole = Array::from_value(&value)
+                    .filter(|array| array.shape() == row.shape(self.worlds));
                 match whole {
                     Some(_) => Some(()),
                     None => self.by_robot(row, &value).map(drop),
@@ -196,7 +196,7 @@ impl InputTable {
             let refused = |reason: String| raise(value.py(), "CommandRefused", reason);
             let row = self.row(name);
             let row = row.ok_or_else(|| refused(format!("this scene has no `{name}`")))?;
-            if let Some(array) = Array::of(&value) {
+            if let Some(array) = Array::from_value(&value) {
                 inputs.push(Input {
                     field: &row.name,
                     columns: 0..row.columns,
@@ -222,7 +222,7 @@ impl InputTable {
         let named = value.cast::<PyDict>().ok()?;
         row.robots.as_ref().filter(|_| row.parts == 1)?;
         let parts = named.iter().map(|(robot, value)| {
-            let array = Array::of(&value)?;
+            let array = Array::from_value(&value)?;
             let &[worlds, size] = array.shape() else {
                 return None;
             };

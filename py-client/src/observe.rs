@@ -143,16 +143,16 @@ fn dict<'py>(py: Python<'py>, arrays: &Arrays, worlds: usize) -> PyResult<Bound<
 
 fn copied<'py>(py: Python<'py>, array: &Array<'_>, worlds: usize) -> PyResult<Bound<'py, PyAny>> {
     match array.dtype {
-        Dtype::F32 => of::<f32>(py, array, worlds),
-        Dtype::F64 => of::<f64>(py, array, worlds),
-        Dtype::I32 => of::<i32>(py, array, worlds),
-        Dtype::U32 => of::<u32>(py, array, worlds),
-        Dtype::U64 => of::<u64>(py, array, worlds),
-        Dtype::U8 => of::<u8>(py, array, worlds),
+        Dtype::F32 => to_numpy::<f32>(py, array, worlds),
+        Dtype::F64 => to_numpy::<f64>(py, array, worlds),
+        Dtype::I32 => to_numpy::<i32>(py, array, worlds),
+        Dtype::U32 => to_numpy::<u32>(py, array, worlds),
+        Dtype::U64 => to_numpy::<u64>(py, array, worlds),
+        Dtype::U8 => to_numpy::<u8>(py, array, worlds),
     }
 }
 
-fn of<'py, T: Element + bytemuck::AnyBitPattern>(
+fn to_numpy<'py, T: Element + bytemuck::AnyBitPattern>(
     py: Python<'py>,
     array: &Array<'_>,
     worlds: usize,

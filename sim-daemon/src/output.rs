@@ -43,7 +43,7 @@ impl Part {
         let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
         let path = beside(&target);
         let file = File::create_new(&path)?;
-        Part::of(file, path, target)
+        Part::from_file(file, path, target)
     }
 
     /// The same under a name that a user knows, such as `run.part.tlrec`: if the process is killed, it stays, and the next one
@@ -64,7 +64,7 @@ impl Part {
             match File::create_new(&path) {
                 // who removes it in between has taken it for that of a killed process
                 Ok(file) if files::try_lock(&file)? && files::is_at(&file, &path)? => {
-                    return Part::of(file, path, target);
+                    return Part::from_file(file, path, target);
                 }
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {
@@ -79,7 +79,7 @@ impl Part {
         }
     }
 
-    fn of(file: File, path: PathBuf, target: PathBuf) -> io::Result<Part> {
+    fn from_file(file: File, path: PathBuf, target: PathBuf) -> io::Result<Part> {
         let part = Part {
             file,
             path,

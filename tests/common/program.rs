@@ -59,7 +59,7 @@ pub struct Played {
 
 impl Rows {
     /// Those of some worlds, in their order.
-    fn of(&self, worlds: &[usize]) -> Rows {
+    fn for_worlds(&self, worlds: &[usize]) -> Rows {
         Rows {
             columns: self.columns.clone(),
             rows: worlds
@@ -102,12 +102,12 @@ impl Numbers {
 
 impl Op {
     /// What it does to some worlds of all, in their order.
-    pub fn of(&self, worlds: &[usize]) -> Op {
+    pub fn for_worlds(&self, worlds: &[usize]) -> Op {
         let some = |mask: &[bool]| worlds.iter().map(|&world| mask[world]).collect();
         match self {
-            Op::Command(field, rows) => Op::Command(*field, rows.of(worlds)),
-            Op::Write(field, rows) => Op::Write(*field, rows.of(worlds)),
-            Op::Param(param, rows) => Op::Param(*param, rows.of(worlds)),
+            Op::Command(field, rows) => Op::Command(*field, rows.for_worlds(worlds)),
+            Op::Write(field, rows) => Op::Write(*field, rows.for_worlds(worlds)),
+            Op::Param(param, rows) => Op::Param(*param, rows.for_worlds(worlds)),
             Op::Reset(mask, Some(seeds)) if seeds.len() > 1 => {
                 let seeds = worlds.iter().map(|&world| seeds[world]).collect();
                 Op::Reset(some(mask), Some(seeds))

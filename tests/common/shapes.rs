@@ -131,7 +131,7 @@ pub fn stone(corners: &[[f64; 3]]) -> Shape {
         scale: [1.0; 3],
         triangles: solid(corners),
         closed: true,
-        hulls: vec![Hull::of(corners, 64).unwrap()],
+        hulls: vec![Hull::from_points(corners, 64).unwrap()],
         notes: Vec::new(),
         ignored_up_axis: None,
     }))
@@ -139,7 +139,7 @@ pub fn stone(corners: &[[f64; 3]]) -> Shape {
 
 /// Triangles of the hull of some corners, counter-clockwise from outside.
 fn solid(corners: &[[f64; 3]]) -> TriMesh {
-    let hull = Hull::of(corners, 64).unwrap();
+    let hull = Hull::from_points(corners, 64).unwrap();
     let fan = |corners: &[u32]| -> Vec<[u32; 3]> {
         let pairs = corners[1..].windows(2);
         pairs.map(|pair| [corners[0], pair[0], pair[1]]).collect()

@@ -13,7 +13,7 @@ pub fn stones(cone: Cone) -> Description {
     let pose = Pose::at([0.12, 0.0, 0.03]);
     scene.add_shape("", Shape::Box { half_extents }, pose);
     let corners = nearly_round(0.05);
-    let vertices = Hull::of(&corners, 64).unwrap().vertices.len();
+    let vertices = Hull::from_points(&corners, 64).unwrap().vertices.len();
     assert_eq!(vertices, NEARLY_ROUND, "a corner is inside the hull");
     for (name, place) in [("one", [0.1, 0.0, 0.12]), ("other", [-0.05, 0.05, 0.07])] {
         let mut body = Body::new(name, Pose::at(place));

@@ -49,7 +49,7 @@ fn a_world_alone_is_the_world_among_others() {
         let all = vec![Op::Reset(vec![true; worlds], Some(seeds))];
         let ops: Vec<Op> = all.into_iter().chain(ops).collect();
         let together = play(&model, &options, &ops).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
-        let alone: Vec<Op> = ops.iter().map(|op| op.of(&[3])).collect();
+        let alone: Vec<Op> = ops.iter().map(|op| op.for_worlds(&[3])).collect();
         let one = Options {
             worlds: 1,
             ..options.clone()

@@ -24,7 +24,7 @@ struct Peer {
 }
 
 impl Peer {
-    fn of(sim: &mut Simulation, slots: usize) -> Peer {
+    fn new(sim: &mut Simulation, slots: usize) -> Peer {
         let shared = sim.sharing().unwrap().share(slots).unwrap();
         assert_eq!(shared.slots, slots);
         if let Err(reason) = &shared.timelines {
@@ -84,7 +84,7 @@ fn a_slot_holds_the_frame_of_its_arena_until_that_arena_is_written_again() {
         let (param, values) = (Param::JointQNoise, Values::F64(&deviations));
         run.sim.write_param(param, 0..9, values, None).unwrap();
         let words = run.arena.len();
-        let peer = Peer::of(&mut run.sim, 2);
+        let peer = Peer::new(&mut run.sim, 2);
         let mut arenas = [vec![0; words], vec![0; words], vec![0; words]];
         let mut frames = Vec::new();
         for (k, arena) in arenas.iter_mut().enumerate() {
@@ -114,7 +114,7 @@ fn commands_of_another_process_move_every_world_as_those_of_the_host_do() {
         let [mut here, mut there] =
             [(); 2].map(|()| run(&model, gpu(), MANY, &[Field::JointQ, Field::JointQd]));
         open_as_discrete(false);
-        let mut peer = Peer::of(&mut here.sim, 1);
+        let mut peer = Peer::new(&mut here.sim, 1);
         for frame in 0..3 {
             let fields = [Field::JointTargetQ, Field::JointF];
             let left = fields.map(|field| {
@@ -144,7 +144,7 @@ fn commands_of_another_process_move_every_world_as_those_of_the_host_do() {
 fn commands_that_wait_are_kept_when_their_memory_goes() {
     let model = lesson(Demo::Target).compile().unwrap();
     let [mut here, mut there] = [(); 2].map(|()| run(&model, gpu(), 33, &[Field::JointQ]));
-    let mut peer = Peer::of(&mut here.sim, 1);
+    let mut peer = Peer::new(&mut here.sim, 1);
     let values = rows(33, 9, 1);
     let left = peer.leave(Field::JointTargetQ, &values);
     here.sim.sharing().unwrap().stage_shared(&[left]);
@@ -173,7 +173,7 @@ fn cube() -> Arc<Model> {
 fn values_that_the_host_must_see_are_found_wherever_they_are() {
     let worlds = 300;
     let mut run = Run::new(&cube(), options(gpu(), worlds, &[Field::JointQ]));
-    let mut peer = Peer::of(&mut run.sim, 1);
+    let mut peer = Peer::new(&mut run.sim, 1);
     let mut accepts = |field, place: usize, value: f32| {
         let mut values = vec![0.0; worlds * 6];
         values[place] = value;

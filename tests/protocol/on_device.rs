@@ -28,7 +28,7 @@ struct Card {
 }
 
 impl Card {
-    fn of(client: &Client) -> Card {
+    fn new(client: &Client) -> Card {
         let (there, mut descriptors) = client.device_memory(&mut keep_waiting()).unwrap();
         let digits = (0..16).map(|k| u8::from_str_radix(&there.uuid[2 * k..2 * k + 2], 16));
         let uuid: Vec<u8> = digits.collect::<Result<_, _>>().unwrap();
@@ -81,7 +81,7 @@ fn every_frame_is_on_the_card_as_it_is_here_for_as_long_as_it_is_held() {
     let daemon = start("on-card");
     let client = daemon.attach();
     assert_eq!(reset(&client).header().slot, 0, "nobody has asked yet");
-    let card = Card::of(&client);
+    let card = Card::new(&client);
     let mut held: Vec<Frame> = Vec::new();
     let mut slots = Vec::new();
     for n in 0..20 {
@@ -108,7 +108,7 @@ fn every_frame_is_on_the_card_as_it_is_here_for_as_long_as_it_is_held() {
         refused.contains("this lease has no such memory"),
         "{refused}"
     );
-    Card::of(&client).holds(&step(&client, &[]).unwrap());
+    Card::new(&client).holds(&step(&client, &[]).unwrap());
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn commands_that_are_left_on_the_card_move_the_robot_as_commands_from_here() {
     for client in [&there, &here] {
         reset(client);
     }
-    let mut card = Card::of(&there);
+    let mut card = Card::new(&there);
     for n in 0..12 {
         let (target, force) = (targets(n), targets(100 + n));
         let left = card.leave("joint_target_q", &target) | card.leave("joint_f", &force);
@@ -144,7 +144,7 @@ fn what_is_wrong_on_the_card_is_refused_with_the_sentence_of_the_host() {
     let daemon = start("wrong-on-card");
     let client = daemon.attach();
     let before = reset(&client).field("joint_q").unwrap().as_bytes().to_vec();
-    let mut card = Card::of(&client);
+    let mut card = Card::new(&client);
     let mut wrong = targets(0);
     wrong[30] = f32::NAN;
     let left = card.leave("joint_target_q", &wrong);
@@ -183,7 +183,7 @@ fn a_recorder_gets_the_commands_that_were_left_on_the_card() {
     let daemon = start("recorded-on-card");
     let (client, recorder) = (daemon.attach(), daemon.attach());
     reset(&client);
-    let mut card = Card::of(&client);
+    let mut card = Card::new(&client);
     let mut journal = recorder.journal(&[], &mut keep_waiting()).unwrap();
     let mut next = || {
         let entry = journal.next(Duration::from_secs(20), &mut keep_waiting());
@@ -239,11 +239,11 @@ fn visitors_that_say_nothing_or_nonsense_or_leave_disturb_nobody() {
             .write_all(words)
             .unwrap();
     }
-    let card = Card::of(&client);
+    let card = Card::new(&client);
     card.holds(&step(&client, &[]).unwrap());
     drop(silent);
     // asked for again, it is other memory
-    let again = Card::of(&client);
+    let again = Card::new(&client);
     let frame = step(&client, &[]).unwrap();
     again.holds(&frame);
     drop((card, again));

@@ -33,7 +33,7 @@ pub struct Couplings {
 
 impl Couplings {
     /// Those of a model, of equalities those that act at its start.
-    pub fn of(model: &Model) -> Couplings {
+    pub fn from_model(model: &Model) -> Couplings {
         let m = model.constants();
         let mut found = Couplings::default();
         for equality in &m.equalities {

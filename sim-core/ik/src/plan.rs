@@ -84,7 +84,7 @@ impl Plan {
         let of_joint = |dof: usize| m.bodies[m.dofs[dof].body].dofs();
         let all = |dof: usize| of_joint(dof).all(|dof| task.moves[dof]);
         let moves: Vec<bool> = (0..m.dofs.len()).map(all).collect();
-        let mut couplings = Couplings::of(model);
+        let mut couplings = Couplings::from_model(model);
         let mut closures = closures(model);
         let columns_of = |reach: &Reach| {
             let other = reach.relative_to.as_ref().and_then(|other| other.body);

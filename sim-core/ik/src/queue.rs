@@ -203,7 +203,7 @@ fn begin<F: Lane>(
             postures => row(postures, coords, problem),
         };
         for (k, &c) in t.coords.iter().enumerate() {
-            lanes.inbox.row_mut(1 + t.coords.len() + k)[lane] = F::Real::of(reference[c]);
+            lanes.inbox.row_mut(1 + t.coords.len() + k)[lane] = F::Real::from_f64(reference[c]);
         }
     }
     let mut at = 1 + 2 * t.coords.len();
@@ -215,7 +215,7 @@ fn begin<F: Lane>(
             target.axes[2],
         ];
         for (k, x) in numbers.iter().flat_map(|vector| vector.0).enumerate() {
-            lanes.inbox.row_mut(at + k)[lane] = F::Real::of(x);
+            lanes.inbox.row_mut(at + k)[lane] = F::Real::from_f64(x);
         }
         at += TARGET;
     }
@@ -251,9 +251,9 @@ fn write_start<F: Lane>(
     } else {
         FREE
     };
-    lanes.inbox.row_mut(0)[lane] = F::Real::of(kind);
+    lanes.inbox.row_mut(0)[lane] = F::Real::from_f64(kind);
     for (k, &c) in job.tables.coords.iter().enumerate() {
-        lanes.inbox.row_mut(1 + k)[lane] = F::Real::of(q[c]);
+        lanes.inbox.row_mut(1 + k)[lane] = F::Real::from_f64(q[c]);
     }
 }
 

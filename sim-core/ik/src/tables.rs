@@ -175,9 +175,9 @@ where
             coord: coord(relation.follower),
             leader: relation.leader.map(coord),
             leader_slope: relation.leader.and_then(slope_of),
-            scale: R::of(relation.scale),
-            offset: R::of(relation.offset),
-            polynomial: relation.polynomial.map(R::of),
+            scale: R::from_f64(relation.scale),
+            offset: R::from_f64(relation.offset),
+            polynomial: relation.polynomial.map(R::from_f64),
         });
         let mut coord_of = vec![None; count];
         for joint in &plan.joints {
@@ -194,7 +194,7 @@ where
         let start = model.start();
         let mocaps = [&start.mocap_pos, &start.mocap_quat];
         Tables {
-            mocaps: mocaps.map(|values| values.iter().map(|&x| R::of(x)).collect()),
+            mocaps: mocaps.map(|values| values.iter().map(|&x| R::from_f64(x)).collect()),
             bodies: plan.bodies.clone(),
             coords: plan.coords.clone(),
             moved: plan.moved(),
@@ -208,7 +208,11 @@ where
             lengths: lengths
                 .map(|l| length_table(model, plan, l, &slope_of))
                 .collect(),
-            posture: plan.posture_weight.iter().map(|w| R::of(w * w)).collect(),
+            posture: plan
+                .posture_weight
+                .iter()
+                .map(|w| R::from_f64(w * w))
+                .collect(),
             has_posture: plan.posture_weight.iter().any(|&w| w > 0.0),
             rows: rows.collect(),
             diagonal: (0..count).map(|i| pattern.at(i, i)).collect(),
@@ -221,10 +225,10 @@ where
 /// Bounds that no rounding widens.
 fn inwards<R: Real>([lower, upper]: [f64; 2]) -> [R; 2] {
     let step = |x: f64, by: f64| {
-        let near = R::of(x);
+        let near = R::from_f64(x);
         match (near.to_f64() - x) * by < 0.0 {
             // one rounding further inside
-            true => R::of(near.to_f64() + by * R::EPSILON * x.abs().max(f64::MIN_POSITIVE)),
+            true => R::from_f64(near.to_f64() + by * R::EPSILON * x.abs().max(f64::MIN_POSITIVE)),
             false => near,
         }
     };
@@ -232,7 +236,7 @@ fn inwards<R: Real>([lower, upper]: [f64; 2]) -> [R; 2] {
     match inside[0] <= inside[1] {
         true => inside,
         // both ends are one value, which this precision does not have
-        false => [R::of(lower); 2],
+        false => [R::from_f64(lower); 2],
     }
 }
 
@@ -241,8 +245,8 @@ fn turning_of<R: Real>(model: &Model, joint: &Joint) -> Turning<R> {
         motion: joint.motion,
         coord: joint.coord,
         variable: joint.variable,
-        center: model.constants().bodies[joint.body].center.map(R::of),
-        turn_max: joint.turn_max.map(R::of),
+        center: model.constants().bodies[joint.body].center.map(R::from_f64),
+        turn_max: joint.turn_max.map(R::from_f64),
     }
 }
 
@@ -256,8 +260,8 @@ fn places(pattern: &Pattern, variables: &[usize]) -> Vec<usize> {
 fn weight<R: Real>(weights: [f64; 3]) -> Weight<R> {
     match weights {
         [0.0, 0.0, 0.0] => Weight::None,
-        [x, y, z] if x == y && y == z => Weight::Uniform(R::of(x)),
-        axes => Weight::Axes(axes.map(R::of)),
+        [x, y, z] if x == y && y == z => Weight::Uniform(R::from_f64(x)),
+        axes => Weight::Axes(axes.map(R::from_f64)),
     }
 }
 
@@ -318,14 +322,14 @@ fn length_table<R: Real>(
             coord: model.constants().dofs[term.dof].coord,
             column: plan.variable_of[term.dof].and_then(|v| variables.binary_search(&v).ok()),
             slope: slope_of(term.dof),
-            coefficient: R::of(term.coefficient),
+            coefficient: R::from_f64(term.coefficient),
         });
         terms.collect()
     });
     LengthTable {
         terms,
-        offsets: lengths.offsets.map(R::of),
-        polynomial: lengths.polynomial.map(R::of),
+        offsets: lengths.offsets.map(R::from_f64),
+        polynomial: lengths.polynomial.map(R::from_f64),
         places: places(&plan.pattern, &variables),
         variables,
     }

@@ -35,7 +35,7 @@ impl FileError {
     }
 
     /// As the error of a robot's or a model's file.
-    pub(crate) fn of(&self, path: &Path) -> ModelError {
+    pub(crate) fn at_path(&self, path: &Path) -> ModelError {
         ModelError::File {
             path: path.to_owned(),
             reason: self.reason(),

@@ -31,7 +31,7 @@ pub struct GeomContact {
 
 impl GeomContact {
     /// A surface of ours as a geom, for contacts with one: its stiffness and damping as `solref`, and MuJoCo's defaults.
-    pub(crate) fn of(surface: &Surface) -> GeomContact {
+    pub(crate) fn from_surface(surface: &Surface) -> GeomContact {
         let bits = u32::from(surface.group != 0);
         GeomContact {
             contype: bits,

@@ -26,7 +26,7 @@ pub fn append(
     with_fans: bool,
     tables: &mut Tables<f64>,
 ) -> (HullTables, Vec<HullFrame>) {
-    let frames: Vec<HullFrame> = hulls.iter().map(HullFrame::of).collect();
+    let frames: Vec<HullFrame> = hulls.iter().map(HullFrame::from_hull).collect();
     let mut rows = Rows::default();
     let clustered = hulls.iter().any(|hull| hull.vertices.len() > CLUSTER);
     let mut fans = Fans::default();
@@ -86,7 +86,7 @@ pub fn append(
 }
 
 impl HullFrame {
-    fn of(hull: &Hull) -> HullFrame {
+    fn from_hull(hull: &Hull) -> HullFrame {
         let [low, high] = hull.extent();
         let (center, radius) = hull.bounding_sphere();
         HullFrame {
@@ -246,7 +246,7 @@ mod tests {
                 [radius * cos, radius * sin, z]
             })
             .collect();
-        Hull::of(&points, 1024).unwrap()
+        Hull::from_points(&points, 1024).unwrap()
     }
 
     #[test]

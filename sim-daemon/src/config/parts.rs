@@ -49,7 +49,7 @@ impl SceneFile {
                 .into_iter()
                 .map(|link| &robot.links[link])
             {
-                let place = Place::of(robot, &link.name);
+                let place = Place::on_link(robot, &link.name);
                 let own = self.own_shapes(robot, link);
                 for (index, collision) in link.collisions.iter().enumerate() {
                     let name = names.next().unwrap_or_default();
@@ -134,7 +134,7 @@ impl Place {
     }
 
     /// A link of a robot. The world of a MuJoCo model, its first link, is the world.
-    fn of(robot: &Robot, link: &str) -> Place {
+    fn on_link(robot: &Robot, link: &str) -> Place {
         let is_world = robot.precompiled.is_some() && robot.links[0].name == link;
         Place {
             robot: Some(robot.name.clone()),
@@ -187,7 +187,7 @@ impl Drawing {
         for (count, (link, pose, shape)) in skeleton(robot).into_iter().enumerate() {
             let link = &robot.links[link].name;
             let name = format!("{}/{link}/bone{count}", robot.name);
-            let mut part = Place::of(robot, link).part("bone", &name, &pose);
+            let mut part = Place::on_link(robot, link).part("bone", &name, &pose);
             part["shape"] = json!(shape.kind());
             part["mesh"] = json!(self.place(&shape, false));
             self.parts.push(part);
@@ -198,7 +198,7 @@ impl Drawing {
     fn visual(&mut self, robot: &Robot, visual: &Visual, index: usize) {
         let own = visual.name.clone().unwrap_or_else(|| index.to_string());
         let name = format!("{}/{}/{own}", robot.name, visual.link);
-        let mut part = Place::of(robot, &visual.link).part("visual", &name, &visual.pose);
+        let mut part = Place::on_link(robot, &visual.link).part("visual", &name, &visual.pose);
         part["mesh"] = Value::Null;
         part["color"] = json!(visual.color);
         let texture = visual.texture.as_ref();

@@ -92,7 +92,7 @@ impl Watched {
             after.push((told.frames, Instant::now()));
             timing.push(told);
             match group.latest(hook) {
-                Ok(Some(frame)) => *seen = Seen::of(&frame),
+                Ok(Some(frame)) => *seen = Seen::from_frame(&frame),
                 // where the daemon has no room for another observer, the rest is known without it
                 Ok(None) | Err(ProtocolError::TooManyClients { .. }) => {}
                 Err(error) => return Err(error),
@@ -130,7 +130,7 @@ impl Watched {
 }
 
 impl Seen {
-    fn of(frame: &sim_protocol::Frame) -> Seen {
+    fn from_frame(frame: &sim_protocol::Frame) -> Seen {
         let status = frame.field("status").ok();
         let status = status.as_ref().and_then(|view| view.as_slice::<u32>());
         let contacts = frame.field("contact_count").ok();

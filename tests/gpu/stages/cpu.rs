@@ -23,7 +23,7 @@ fn gather<F: Lane>(worlds: &[&[f64]], to: &mut [F]) {
         let mut lane = 0;
         while lane < F::WIDTH {
             let world = if lane < worlds.len() { lane } else { 0 };
-            lanes[lane] = F::Real::of(worlds[world][k]);
+            lanes[lane] = F::Real::from_f64(worlds[world][k]);
             lane += 1;
         }
         to[k] = F::load(&lanes[..F::WIDTH]);

@@ -27,7 +27,7 @@ impl Exports {
     ///
     /// # Safety
     /// All handles are of one device, and alive.
-    pub unsafe fn of(
+    pub unsafe fn new(
         instance: &ash::Instance,
         physical: vk::PhysicalDevice,
         device: &ash::Device,

@@ -170,7 +170,7 @@ unsafe fn handles(device: &wgpu::Device, imports: bool, trusts_pipelines: bool) 
         let families = instance.get_physical_device_queue_family_properties(physical);
         Vulkan {
             host: imports.then(|| ash::ext::external_memory_host::Device::new(&instance, &raw)),
-            exports: Exports::of(&instance, physical, &raw, hal.enabled_device_extensions()),
+            exports: Exports::new(&instance, physical, &raw, hal.enabled_device_extensions()),
             host_align: host.min_imported_host_pointer_alignment.max(1),
             trusts_pipelines,
             heaps: instance.get_physical_device_memory_properties(physical),

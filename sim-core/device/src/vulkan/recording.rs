@@ -64,8 +64,8 @@ impl Vulkan {
             let mut before = Before::Any;
             for (number, op) in ops.iter().enumerate() {
                 // also before the first: it waits for earlier batches and for wgpu's own commands
-                barrier(device, made.commands, before, Next::of(op));
-                before = Before::of(op);
+                barrier(device, made.commands, before, Next::from_op(op));
+                before = Before::from_op(op);
                 match op {
                     RawOp::Dispatch {
                         pipeline, groups, ..
@@ -219,7 +219,7 @@ enum Before {
 }
 
 impl Before {
-    fn of<P, B>(op: &RawOp<'_, P, B>) -> Before {
+    fn from_op<P, B>(op: &RawOp<'_, P, B>) -> Before {
         match op {
             RawOp::Dispatch { .. } => Before::Program,
             RawOp::Copy { .. } => Before::Any,
@@ -241,7 +241,7 @@ enum Next {
 }
 
 impl Next {
-    fn of<P, B>(op: &RawOp<'_, P, B>) -> Next {
+    fn from_op<P, B>(op: &RawOp<'_, P, B>) -> Next {
         match op {
             RawOp::Dispatch {
                 groups: RawGroups::Found(..),

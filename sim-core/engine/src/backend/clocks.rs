@@ -17,7 +17,7 @@ pub(super) fn put<R: Real>(m: &Constants<R>, time: f64, row: &mut [R]) {
     for sensor in &m.sensors.all {
         if let SensorKind::Clock = sensor.kind {
             let most = sensor.cutoff.as_ref().map(|cutoff| cutoff.most.to_f64());
-            row[sensor.first] = R::of(time.min(most.unwrap_or(f64::INFINITY)));
+            row[sensor.first] = R::from_f64(time.min(most.unwrap_or(f64::INFINITY)));
         }
     }
 }

@@ -82,7 +82,7 @@ impl Noise {
 
 impl Noise {
     /// The noise of a field, if it has some.
-    pub fn of(&self, field: Field) -> Option<&FieldNoise> {
+    pub fn for_field(&self, field: Field) -> Option<&FieldNoise> {
         self.fields.iter().find(|(noisy, ..)| *noisy == field)
     }
 }
@@ -150,7 +150,7 @@ fn add_to_joint<R: Real>(motion: Motion, q: &mut [R], noise: impl Fn(usize) -> f
 fn add<R: Real>(x: &mut R, noise: f64) {
     // what has no noise keeps its bits
     if noise != 0.0 {
-        *x = R::of(x.to_f64() + noise);
+        *x = R::from_f64(x.to_f64() + noise);
     }
 }
 
@@ -166,6 +166,6 @@ fn turn<R: Real>(quat: &mut [R], vector: [f64; 3], in_world: bool) {
         false => quat::mul(here, turn),
     };
     for (x, turned) in quat.iter_mut().zip(turned) {
-        *x = R::of(turned);
+        *x = R::from_f64(turned);
     }
 }

@@ -39,7 +39,7 @@ pub(in crate::backend) struct Shape {
 }
 
 impl Shape {
-    pub(in crate::backend) fn of<R: Real>(m: &Constants<R>) -> Shape {
+    pub(in crate::backend) fn from_constants<R: Real>(m: &Constants<R>) -> Shape {
         let mut starts = [0; RECORD.len() + 1];
         for (k, array) in RECORD.into_iter().enumerate() {
             starts[k + 1] = starts[k] + array.scalars(m);
@@ -88,7 +88,7 @@ pub(in crate::backend) fn array_of(field: Field) -> Array {
 
 /// State and commands of a world after a reset, in the order of [`RECORD`].
 pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
-    let shape = Shape::of(model.constants());
+    let shape = Shape::from_constants(model.constants());
     let start = model.start();
     let mut reset = vec![R::default(); shape.total()];
     for (array, values) in [
@@ -100,7 +100,7 @@ pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
         (Array::EqActive, &start.eq_active),
     ] {
         for (to, from) in reset[shape.start(array)..].iter_mut().zip(values) {
-            *to = R::of(*from);
+            *to = R::from_f64(*from);
         }
     }
     let (sent, history) = (
@@ -111,7 +111,7 @@ pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
         reset[history + k] = reset[sent + k % (3 * shape.dofs)];
     }
     for (k, &(_, x)) in model.constants().varying.starts().iter().enumerate() {
-        reset[shape.start(Array::Params) + k] = R::of(x);
+        reset[shape.start(Array::Params) + k] = R::from_f64(x);
     }
     reset
 }

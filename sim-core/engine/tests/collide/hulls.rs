@@ -93,7 +93,7 @@ fn cases(a: Kind, b: Kind, count: usize) -> (Vec<Hull>, Vec<Pair>) {
             // separated, shallow and deep: placed so that they touch, then moved by a share of the smaller one
             let way = random.direction();
             let [first, second] =
-                [0, 1].map(|i| Polytope::of(shapes[i], &axes[i], [0.0; 3], &hulls));
+                [0, 1].map(|i| Polytope::from_shape(shapes[i], &axes[i], [0.0; 3], &hulls));
             let touching = -along(&first, &second, way);
             let most = touching.min(0.1);
             let out = match random.unit() {
@@ -115,8 +115,8 @@ fn check(a: Kind, b: Kind, count: usize) -> Found {
     let (hulls, pairs) = cases(a, b, count);
     let mut found = Found::default();
     for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
-        let a = Polytope::of(pair.shapes[0], &pair.axes[0], [0.0; 3], &hulls);
-        let b = Polytope::of(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
+        let a = Polytope::from_shape(pair.shapes[0], &pair.axes[0], [0.0; 3], &hulls);
+        let b = Polytope::from_shape(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
         let width = |x: &Polytope| {
             (0..3)
                 .map(|i| {
@@ -250,7 +250,7 @@ fn the_lowest_vertex_of_a_hull_above_a_plane_is_found() {
         pair.shapes[0] = Shape::Plane;
     }
     for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
-        let hull = Polytope::of(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
+        let hull = Polytope::from_shape(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
         let n = pair.axes[0][2];
         let truth = -hull.reach(scale(n, -1.0));
         assert!(found.len() >= 3, "{found:?}");

@@ -153,7 +153,7 @@ fn touching_parallel_and_concentric_shapes_have_finite_points() {
     let (mut hulls, blocks) = blocks(1);
     let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 0.02 } else { -0.02 });
     let corners: Vec<Vector> = (0..8).map(corner).collect();
-    hulls.push(Hull::of(&corners, 64).unwrap());
+    hulls.push(Hull::from_points(&corners, 64).unwrap());
     let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let lying = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
     let even = |shape: Shape| match shape {

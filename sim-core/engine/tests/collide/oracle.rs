@@ -18,7 +18,12 @@ pub struct Polytope {
 }
 
 impl Polytope {
-    pub fn of(shape: Shape, axes: &[Vector; 3], center: Vector, hulls: &[Hull]) -> Polytope {
+    pub fn from_shape(
+        shape: Shape,
+        axes: &[Vector; 3],
+        center: Vector,
+        hulls: &[Hull],
+    ) -> Polytope {
         let place = |x: Vector| add(transform(axes, x), center);
         let mut polytope = Polytope {
             points: vec![center],

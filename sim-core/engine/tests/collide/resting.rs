@@ -21,7 +21,7 @@ fn prism(corners: usize, radius: f64, half: f64) -> Hull {
             ]
         })
         .collect();
-    Hull::of(&points, 64).unwrap()
+    Hull::from_points(&points, 64).unwrap()
 }
 
 /// Points of b on a, b upside down or on its side, 0.1 mm deep, in both precisions.

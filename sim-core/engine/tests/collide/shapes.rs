@@ -59,7 +59,7 @@ impl Random {
                 std::array::from_fn(|i| 0.02 + size[i] * far * way[i])
             })
             .collect();
-        Hull::of(&cloud, 64).unwrap()
+        Hull::from_points(&cloud, 64).unwrap()
     }
 }
 

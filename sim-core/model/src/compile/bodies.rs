@@ -56,7 +56,7 @@ pub(super) struct BodyBuilder {
 
 impl BodyBuilder {
     /// All robots of a scene.
-    pub fn of(scene: &Description) -> BodyBuilder {
+    pub fn from_scene(scene: &Description) -> BodyBuilder {
         let mut builder = BodyBuilder {
             dt: scene.dt,
             ..BodyBuilder::default()

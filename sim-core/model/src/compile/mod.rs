@@ -63,7 +63,7 @@ impl Description {
 }
 
 fn compile(scene: &Description) -> Result<Model, ModelError> {
-    let mut builder = BodyBuilder::of(scene);
+    let mut builder = BodyBuilder::from_scene(scene);
     let mut m = bodies_alone(scene, &mut builder)?;
     let mut reference = inverse_weight::at_reference(&m, &builder.dof_names)?;
     take_inverse_weights(scene, &builder.robots, &mut reference);

@@ -69,7 +69,7 @@ impl Hull {
     ///
     /// # Errors
     /// Points that are on a line or not finite, and hulls that rounding spoils.
-    pub fn of(points: &[[f64; 3]], vertices_max: usize) -> Result<Hull, NoHull> {
+    pub fn from_points(points: &[[f64; 3]], vertices_max: usize) -> Result<Hull, NoHull> {
         if !points.iter().flatten().all(|x| x.abs() <= COORDINATE_MAX) {
             return Err(NoHull::Thin);
         }

@@ -138,7 +138,7 @@ impl Mesh {
     ///
     /// # Errors
     /// Why they cannot be used, by the name, with the cure.
-    pub fn of(
+    pub fn from_triangles(
         name: &str,
         triangles: TriMesh,
         hull: Option<&[[f64; 3]]>,
@@ -198,7 +198,7 @@ impl Mesh {
     ) -> Result<(), ModelError> {
         let most = options.max_hull_vertices;
         let vertices = hull.unwrap_or(&self.triangles.vertices);
-        let whole = Hull::of(vertices, most)
+        let whole = Hull::from_points(vertices, most)
             .map_err(|why| fault(&self.path, format!("{why}; give it an area, or mend it")))?;
         let flat = whole.flat;
         if flat {
@@ -234,7 +234,7 @@ impl Mesh {
     /// Hulls that cover the mesh together, its own where it is convex; `None` where none can be made.
     fn convex_parts(&self, whole: Hull, vertices_max: usize) -> Option<Vec<Hull>> {
         // measured on the hull of all points: that of few vertices is smaller
-        let full = Hull::of(&self.triangles.vertices, usize::MAX)
+        let full = Hull::from_points(&self.triangles.vertices, usize::MAX)
             .ok()?
             .volume();
         if self.closed && self.triangles.signed_volume() >= (1.0 - CONVEX) * full {
@@ -244,7 +244,7 @@ impl Mesh {
         let parts = convex_parts(&self.triangles)?;
         let hulls = parts
             .iter()
-            .filter_map(|part| Hull::of(part, vertices_max).ok());
+            .filter_map(|part| Hull::from_points(part, vertices_max).ok());
         let hulls: Vec<Hull> = hulls.collect();
         (!hulls.is_empty()).then_some(hulls)
     }

@@ -49,7 +49,7 @@ pub(super) struct Additions<'a> {
 
 impl Additions<'_> {
     /// Those of a model. A field that is missing here and in the first group is a compile error.
-    pub(super) fn of(constants: &Constants<f64>) -> Additions<'_> {
+    pub(super) fn from_constants(constants: &Constants<f64>) -> Additions<'_> {
         let Constants {
             dt: _,
             gravity: _,

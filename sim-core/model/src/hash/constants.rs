@@ -174,7 +174,7 @@ impl View for Constants<f64> {
             ("sites", sites),
         ];
         let scans: [(&str, &dyn View); 1] = [("scans", scans)];
-        let additions: [(&str, &dyn View); 1] = [("mujoco", &Additions::of(self))];
+        let additions: [(&str, &dyn View); 1] = [("mujoco", &Additions::from_constants(self))];
         text.groups(
             "Constants",
             &[

@@ -24,13 +24,13 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let groups = file.integers("actuator_group", count)?;
     let mut actuators = Vec::new();
     for k in 0..count {
-        let length = transmissions.of(k)?;
+        let length = transmissions.length(k)?;
         let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
         let on = |law: [f64; 3]| if is_on { law } else { [0.0; 3] };
         actuators.push(Actuator {
             name: names[k].clone(),
             length,
-            activation: activations.of(k, is_on, acts),
+            activation: activations.activation(k, is_on, acts),
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
             force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match gain_kinds[k].as_str() {
@@ -109,7 +109,7 @@ impl Activations {
     }
 
     /// The activation of actuator `k`. Where it is switched off it is held; within its bounds, unless all are off.
-    fn of(&self, k: usize, is_on: bool, acts: bool) -> Option<ActuatorActivation> {
+    fn activation(&self, k: usize, is_on: bool, acts: bool) -> Option<ActuatorActivation> {
         let time = self.parameters[k][0].max(TIME_MIN);
         let rate = match self.kinds[k].as_str() {
             "mjDYN_NONE" => return None,

@@ -145,14 +145,14 @@ impl Equalities<'_> {
         let count = self.tendons.names.len();
         let lengths = self.file.reals("tendon_length0", count)?;
         let weights = self.file.reals("tendon_invweight0", count)?;
-        let first = self.tendons.of(self.file, self.firsts[k])?.to_vec();
+        let first = self.tendons.terms(self.file, self.firsts[k])?.to_vec();
         let own = self.firsts[k] as usize;
         let [constant, rest @ ..] = self.data[k];
         let mut polynomial = [constant, 0.0, 0.0, 0.0, 0.0];
         let mut inverse_weight = weights[own];
         let (mut second, mut other) = (Vec::new(), 0.0);
         if self.seconds[k] >= 0 {
-            second = self.tendons.of(self.file, self.seconds[k])?.to_vec();
+            second = self.tendons.terms(self.file, self.seconds[k])?.to_vec();
             other = lengths[self.seconds[k] as usize];
             inverse_weight += weights[self.seconds[k] as usize];
             polynomial[1..].copy_from_slice(&rest[..4]);
@@ -244,7 +244,7 @@ fn add_frictions(
     let weights = file.reals("tendon_invweight0", count)?;
     for k in (0..count).filter(|&k| losses[k] > 0.0) {
         parts.constraints.push(Constraint {
-            measure: length(tendons.of(file, k as i64)?),
+            measure: length(tendons.terms(file, k as i64)?),
             law: ConstraintLaw::Friction(losses[k]),
             softness: softness[k],
             inverse_weight: along(weights[k]),
@@ -289,7 +289,7 @@ fn add_limits(
     let weights = file.reals("tendon_invweight0", count)?;
     for k in (0..count).filter(|&k| limited[k] != 0) {
         parts.constraints.push(Constraint {
-            measure: length(tendons.of(file, k as i64)?),
+            measure: length(tendons.terms(file, k as i64)?),
             law: ConstraintLaw::Range {
                 bounds: ranges[k],
                 margin: margins[k],
@@ -319,7 +319,7 @@ fn add_springs(
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
     for k in (0..count).filter(|&k| stiffness[k] != 0.0 || damping[k] != 0.0) {
         parts.tendons.push(Tendon {
-            terms: tendons.of(file, k as i64)?.to_vec(),
+            terms: tendons.terms(file, k as i64)?.to_vec(),
             stiffness: stiffness[k],
             rest: rests[k],
             damping: damping[k],

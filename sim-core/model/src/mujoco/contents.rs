@@ -228,7 +228,7 @@ fn equalities(file: &ModelFile) -> Result<Vec<MujocoElement>, ModelError> {
             _ => word(&named[place]),
         };
         let both = ids.iter();
-        let both = both.filter_map(|ids| objects.of(&kind, ids[place]));
+        let both = both.filter_map(|ids| objects.kind_and_name(&kind, ids[place]));
         equality.on = both.collect();
     }
     Ok(all)
@@ -250,7 +250,9 @@ fn actuators(file: &ModelFile) -> Result<Vec<MujocoElement>, ModelError> {
             other => other.to_owned(),
         };
         let named = targets[place].iter();
-        actuator.on = named.filter_map(|&id| objects.of(&kind, id)).collect();
+        actuator.on = named
+            .filter_map(|&id| objects.kind_and_name(&kind, id))
+            .collect();
         actuator.range = control[place];
         actuator.force_range = force[place];
     }
@@ -298,7 +300,7 @@ fn sensors(file: &ModelFile) -> Result<Vec<MujocoElement>, ModelError> {
     for (place, sensor) in all.iter_mut().enumerate() {
         sensor
             .on
-            .extend(objects.of(&word(&kinds[place]), ids[place]));
+            .extend(objects.kind_and_name(&word(&kinds[place]), ids[place]));
         sensor.scalars = usize::try_from(scalars[place]).unwrap_or(0);
     }
     Ok(all)
@@ -323,7 +325,7 @@ impl Objects {
     }
 
     /// Kind and name of one of them, if it has a name.
-    fn of(&self, kind: &str, id: i64) -> Option<String> {
+    fn kind_and_name(&self, kind: &str, id: i64) -> Option<String> {
         let kind = if kind == "xbody" { "body" } else { kind };
         let (kind, names) = self.0.iter().find(|(other, _)| *other == kind)?;
         let name = names.get(usize::try_from(id).ok()?)?;

@@ -46,7 +46,7 @@ impl ModelFile {
         };
         let bytes = files::read(path, FILE_MAX).map_err(|error| match error {
             FileError::TooLarge { .. } => fault("is larger than 2 GiB".to_owned()),
-            error => error.of(path),
+            error => error.at_path(path),
         })?;
         let tensors = SafeTensors::deserialize(&bytes)
             .map_err(|error| fault(format!("is no exported MuJoCo model: {error}")))?;

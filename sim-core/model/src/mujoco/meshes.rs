@@ -175,7 +175,7 @@ impl<'a> Meshes<'a> {
         let points = triangles.vertices.clone();
         let hull: Vec<[f64; 3]> = corners.iter().map(|&corner| points[corner]).collect();
         let most = options.max_hull_vertices;
-        let mut mesh = Mesh::of(
+        let mut mesh = Mesh::from_triangles(
             &self.names[place],
             triangles,
             (!hull.is_empty()).then_some(&hull[..]),

@@ -55,7 +55,7 @@ impl Tendons {
     ///
     /// # Errors
     /// No such tendon, or a spatial one.
-    pub fn of(&self, file: &ModelFile, tendon: i64) -> Result<&[(usize, f64)], ModelError> {
+    pub fn terms(&self, file: &ModelFile, tendon: i64) -> Result<&[(usize, f64)], ModelError> {
         let place = usize::try_from(tendon).ok();
         let found = place.and_then(|place| self.terms.get(place)?.as_deref());
         found.ok_or_else(|| file.fault(format!("has no fixed tendon {tendon}")))

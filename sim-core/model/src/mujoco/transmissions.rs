@@ -52,7 +52,7 @@ impl<'a> Transmissions<'a> {
     }
 
     /// What actuator `k` acts on.
-    pub(super) fn of(&self, k: usize) -> Result<ActuatorLength, ModelError> {
+    pub(super) fn length(&self, k: usize) -> Result<ActuatorLength, ModelError> {
         let gear = self.gears[k];
         let [target, other] = self.targets[k];
         let fault = || {
@@ -64,7 +64,7 @@ impl<'a> Transmissions<'a> {
         let in_parent = kind == "mjTRN_JOINTINPARENT";
         match kind {
             "mjTRN_TENDON" => {
-                let terms = self.tendons.of(self.file, target)?.iter();
+                let terms = self.tendons.terms(self.file, target)?.iter();
                 let terms = terms.map(|&(joint, coefficient)| (joint, coefficient * gear[0]));
                 Ok(ActuatorLength::Joints(terms.collect()))
             }

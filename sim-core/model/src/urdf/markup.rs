@@ -34,7 +34,7 @@ pub(super) struct Markup<'a> {
 }
 
 impl<'a> Markup<'a> {
-    pub fn of(text: &'a str) -> Markup<'a> {
+    pub fn from_text(text: &'a str) -> Markup<'a> {
         let bytes = text.as_bytes();
         let count = |byte| bytes.iter().filter(|&&other| other == byte).count();
         let mut markup = Markup {

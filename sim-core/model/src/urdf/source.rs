@@ -30,7 +30,7 @@ const NO_XML: &str = "this is no XML; a URDF file begins with `<`, and holds one
 pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<String, ModelError> {
     let bytes = files::read(path, FILE_MAX as u64).map_err(|error| match error {
         FileError::TooLarge { .. } => size_limit(path),
-        error => error.of(path),
+        error => error.at_path(path),
     })?;
     if let Some(other) = contents::neither_robot_nor_mesh(&bytes) {
         return Err(ModelError::Xml {
@@ -119,7 +119,7 @@ pub(super) fn prepare<'a>(
     if !text.trim_start().starts_with('<') {
         return Err(refuse(0, NO_XML.to_owned()));
     }
-    let markup = Markup::of(text);
+    let markup = Markup::from_text(text);
     if let Some(at) = markup.document_type {
         if starts_with(&text[at..], "<!doctype html") {
             return Err(refuse(at, contents::WEB_PAGE.to_owned()));

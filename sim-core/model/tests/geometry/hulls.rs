@@ -80,7 +80,7 @@ pub fn assert_sound(hull: &Hull, points: &[[f64; 3]]) {
 }
 
 fn hull(points: &[[f64; 3]]) -> Hull {
-    let hull = Hull::of(points, 4096).unwrap();
+    let hull = Hull::from_points(points, 4096).unwrap();
     assert_sound(&hull, points);
     hull
 }
@@ -142,7 +142,7 @@ fn fewer_vertices_leave_a_measured_error_that_falls_as_they_grow() {
         .collect();
     let mut last = f64::MAX;
     for most in [8, 16, 32, 64, 256, 1024] {
-        let hull = Hull::of(&points, most).unwrap();
+        let hull = Hull::from_points(&points, most).unwrap();
         assert_sound(&hull, &points);
         assert!(hull.vertices.len() <= most);
         // cap of one vertex's share of the sphere, 4 π / n, is 2 / n high; farthest-first is within 4 times that
@@ -194,7 +194,7 @@ fn a_flat_cloud_becomes_a_plate_and_a_line_nothing() {
             ]
         })
         .collect();
-    let plate = Hull::of(&sheet, 64).unwrap();
+    let plate = Hull::from_points(&sheet, 64).unwrap();
     assert_eq!(
         (plate.vertices.len(), plate.faces.len(), plate.edges.len()),
         (8, 6, 12)
@@ -205,17 +205,17 @@ fn a_flat_cloud_becomes_a_plate_and_a_line_nothing() {
     let line: Vec<[f64; 3]> = (0..100)
         .map(|i| [f64::from(i), 2.0 * f64::from(i), 0.0])
         .collect();
-    assert_eq!(Hull::of(&line, 64), Err(NoHull::Thin));
+    assert_eq!(Hull::from_points(&line, 64), Err(NoHull::Thin));
     for cloud in [
         vec![],
         vec![[1.0, 2.0, 3.0]; 1000],
         vec![[0.0; 3], [1.0; 3]],
         vec![[f64::NAN; 3]; 9],
     ] {
-        assert_eq!(Hull::of(&cloud, 64), Err(NoHull::Thin));
+        assert_eq!(Hull::from_points(&cloud, 64), Err(NoHull::Thin));
     }
     assert_eq!(
-        Hull::of(&[[f64::INFINITY, 0.0, 0.0], [0.0; 3], [1.0; 3]], 64),
+        Hull::from_points(&[[f64::INFINITY, 0.0, 0.0], [0.0; 3], [1.0; 3]], 64),
         Err(NoHull::Thin)
     );
 }
@@ -256,7 +256,7 @@ fn a_million_points_on_a_ball_take_no_minute() {
         })
         .collect();
     let start = Instant::now();
-    let hull = Hull::of(&points, 64).unwrap();
+    let hull = Hull::from_points(&points, 64).unwrap();
     assert!(
         start.elapsed() < Duration::from_secs(60),
         "{:?}",
@@ -317,7 +317,7 @@ proptest! {
 
     #[test]
     fn nasty_clouds_have_a_sound_hull_or_none(cloud in nasty_cloud(), most in prop_oneof![Just(8), Just(64), Just(4096)]) {
-        let hull = Hull::of(&cloud, most);
+        let hull = Hull::from_points(&cloud, most);
         prop_assert!(hull.is_ok() || !is_fat(&cloud), "{:?}", hull);
         if let Ok(hull) = hull {
             prop_assert!(hull.vertices.len() <= most);

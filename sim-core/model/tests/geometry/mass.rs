@@ -8,7 +8,7 @@ use sim_model::{Inertial, Shape};
 
 use crate::files::{Folder, assert_alike, brick, inside_out, joined, mapped, obj, unit_density};
 
-fn of(shape: Shape) -> Inertial {
+fn properties(shape: Shape) -> Inertial {
     mass_properties(&shape, 1.0).unwrap()
 }
 
@@ -36,7 +36,7 @@ fn of_mesh(test: &str, mesh: &TriMesh) -> Inertial {
 #[test]
 fn primitives_have_their_textbook_inertia() {
     let (r, h) = (0.3, 0.7);
-    let box_ = of(Shape::Box {
+    let box_ = properties(Shape::Box {
         half_extents: [1.0, 2.0, 3.0],
     });
     assert_alike(
@@ -46,13 +46,13 @@ fn primitives_have_their_textbook_inertia() {
     );
     let ball = 4.0 / 3.0 * PI * r * r * r;
     assert_alike(
-        &of(Shape::Sphere { radius: r }),
+        &properties(Shape::Sphere { radius: r }),
         &body(ball, [0.4 * ball * r * r; 3]),
         1e-15,
     );
     let rod = PI * r * r * 2.0 * h;
     let across = rod * (3.0 * r * r + (2.0 * h) * (2.0 * h)) / 12.0;
-    let cylinder = of(Shape::Cylinder {
+    let cylinder = properties(Shape::Cylinder {
         radius: r,
         half_height: h,
     });
@@ -72,18 +72,18 @@ fn a_capsule_is_the_limit_of_its_inscribed_polyhedra() {
     };
     let inscribed = of_mesh("capsule", &triangles(&capsule));
     // area of a regular 48-gon over its circle's: 0.9971; the profile's error is of the same order
-    assert_alike(&of(capsule), &inscribed, 1e-2);
+    assert_alike(&properties(capsule), &inscribed, 1e-2);
     let ball = Shape::Sphere { radius: 0.3 };
     let nearly = Shape::Capsule {
         radius: 0.3,
         half_height: 1e-9,
     };
-    assert_alike(&of(nearly), &of(ball), 1e-7);
+    assert_alike(&properties(nearly), &properties(ball), 1e-7);
     // far apart ends: two half balls on a rod, by the parallel axis theorem
     let (r, h) = (0.01, 10.0);
     let caps = 4.0 / 3.0 * PI * r * r * r;
     let rod = PI * r * r * 2.0 * h;
-    let long = of(Shape::Capsule {
+    let long = properties(Shape::Capsule {
         radius: r,
         half_height: h,
     });

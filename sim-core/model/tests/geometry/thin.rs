@@ -119,7 +119,7 @@ fn discs_needles_and_slabs_of_any_thickness_have_sound_hulls_wherever_they_lie()
         let mesh = mapped(&prism(corners, sides), |p| {
             rows.map(|row| dot(row, p) + far)
         });
-        let hull = Hull::of(&mesh.vertices, 1024).unwrap_or_else(|why| {
+        let hull = Hull::from_points(&mesh.vertices, 1024).unwrap_or_else(|why| {
             panic!("case {case}, {corners} corners, {sides:?}, {far} away: {why}")
         });
         assert!(!hull.flat);
@@ -134,7 +134,7 @@ fn discs_needles_and_slabs_of_any_thickness_have_sound_hulls_wherever_they_lie()
         let slack = 1e-15 * (long + far) / sides[1].min(thickness) + 1e-12;
         let share = hull.volume() / volume(corners, sides);
         assert!((share - 1.0).abs() < slack, "case {case}: {share}");
-        let few = Hull::of(&mesh.vertices, 64).unwrap();
+        let few = Hull::from_points(&mesh.vertices, 64).unwrap();
         assert!(few.vertices.len() <= 64);
         assert_sound(&few, &mesh.vertices);
         assert_convex(&few, thickness);
@@ -164,7 +164,7 @@ fn a_floor_scan_with_noise_is_a_floor() {
             })
             .collect();
         for most in [16, 64, 1024] {
-            let hull = Hull::of(&points, most).unwrap();
+            let hull = Hull::from_points(&points, most).unwrap();
             assert_sound(&hull, &points);
             assert_convex(&hull, noise);
             let share = hull.volume() / (2.0 * noise);
@@ -186,7 +186,7 @@ fn thin_meshes_rounded_to_f32_have_hulls_too() {
             rows.map(|row| f64::from((dot(row, p) + far) as f32))
         });
         for most in [8, 64, 1024] {
-            let hull = Hull::of(&mesh.vertices, most)
+            let hull = Hull::from_points(&mesh.vertices, most)
                 .unwrap_or_else(|why| panic!("case {case}, {sides:?}: {why}"));
             assert_sound(&hull, &mesh.vertices);
         }
@@ -197,7 +197,7 @@ fn thin_meshes_rounded_to_f32_have_hulls_too() {
 fn only_a_sheet_without_thickness_is_flat() {
     let sheet = |thickness: f64| {
         let mesh = prism(5, [1.0, 1.0, thickness]);
-        Hull::of(&mesh.vertices, 64)
+        Hull::from_points(&mesh.vertices, 64)
     };
     for thickness in [1e-3, 1e-5, 2e-7, 1e-8] {
         let hull = sheet(thickness).unwrap();
@@ -207,7 +207,7 @@ fn only_a_sheet_without_thickness_is_flat() {
     }
     assert!(sheet(0.0).unwrap().flat);
     let needle = prism(5, [1.0, 0.0, 0.0]);
-    assert_eq!(Hull::of(&needle.vertices, 64), Err(NoHull::Thin));
+    assert_eq!(Hull::from_points(&needle.vertices, 64), Err(NoHull::Thin));
 }
 
 /// Mass properties of a cuboid at the origin.

@@ -292,7 +292,7 @@ pub struct Run {
 
 impl Run {
     /// The runs of rising columns with their places.
-    pub fn of(columns: impl IntoIterator<Item = (usize, usize)>) -> Vec<Run> {
+    pub fn from_columns(columns: impl IntoIterator<Item = (usize, usize)>) -> Vec<Run> {
         let mut runs: Vec<Run> = Vec::new();
         for (column, place) in columns {
             match runs.last_mut() {
@@ -464,7 +464,7 @@ impl<R: Real> Contacts<R> {
         };
         Contacts {
             cone,
-            impratio: R::of(impratio),
+            impratio: R::from_f64(impratio),
             solids: Vec::new(),
             groups: Vec::new(),
             classes: Vec::new(),

@@ -15,7 +15,7 @@ macro_rules! scalar {
         $(impl<S: Real> Recast<S> for $real {
             type Out = S;
             fn recast(&self) -> S {
-                S::of(self.to_f64())
+                S::from_f64(self.to_f64())
             }
         })*
     };

@@ -27,7 +27,7 @@ pub trait Real: Copy + Default + PartialOrd + Send + Sync + std::fmt::Debug + 's
     /// True for `f64`.
     const DOUBLE: bool;
     /// Rounds a double to this precision.
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
     /// Widens to a double.
     fn to_f64(self) -> f64;
     /// As an integer, rounded towards 0; 0 for negative values and NaN.
@@ -41,7 +41,7 @@ impl Real for f32 {
     const EPSILON: f64 = f32::EPSILON as f64;
     const DOUBLE: bool = false;
     #[inline(always)]
-    fn of(x: f64) -> f32 {
+    fn from_f64(x: f64) -> f32 {
         x as f32
     }
     #[inline(always)]
@@ -54,7 +54,7 @@ impl Real for f64 {
     const EPSILON: f64 = f64::EPSILON;
     const DOUBLE: bool = true;
     #[inline(always)]
-    fn of(x: f64) -> f64 {
+    fn from_f64(x: f64) -> f64 {
         x
     }
     #[inline(always)]
@@ -83,7 +83,7 @@ pub trait Num:
     /// The same constant in every world, rounded from a double.
     #[inline(always)]
     fn c(x: f64) -> Self {
-        Self::k(Self::Real::of(x))
+        Self::k(Self::Real::from_f64(x))
     }
     /// `self * b + c`, rounded once.
     fn fma(self, b: Self, c: Self) -> Self;

@@ -51,7 +51,11 @@ const SPRINGS: Fixed = Fixed {
 pub fn tables<R: Real>() -> Tables<R> {
     let springs = (0..9).flat_map(|i| [0.5 - 0.2 * f64::from(i), 1.0 + 0.3 * f64::from(i)]);
     Tables {
-        numbers: [0.0; 3].into_iter().chain(springs).map(R::of).collect(),
+        numbers: [0.0; 3]
+            .into_iter()
+            .chain(springs)
+            .map(R::from_f64)
+            .collect(),
         // pair 0 is left out
         indices: vec![1, 9, 2, 0, 1, 0, 1, 0, 0, 2, 1, 0, 3, 3, 1, 4, 0],
     }

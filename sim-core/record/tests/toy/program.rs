@@ -71,7 +71,7 @@ pub fn tables<R: Real>() -> Tables<R> {
         9.0, 0.5, -1.0, 2.0, 0.25, -0.75, 3.0, 1.0, 1.5, -2.0, 0.125, 7.0, -0.5,
     ];
     Tables {
-        numbers: numbers.map(R::of).to_vec(),
+        numbers: numbers.map(R::from_f64).to_vec(),
         indices: vec![0, 3, 3, 2, 1, 4, 3, 3, 0, 5],
     }
 }

@@ -80,7 +80,7 @@ impl Observer {
             .ok_or_else(|| damaged(peer, "receive a frame"))?
             .map_err(|error| ProtocolError::transport("receive a frame", error))?
         {
-            drop(newest.replace(Port::of(self.subscriber.owner(), sample)));
+            drop(newest.replace(Port::with_owner(self.subscriber.owner(), sample)));
         }
         Ok(newest)
     }

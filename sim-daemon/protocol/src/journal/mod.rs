@@ -186,7 +186,7 @@ impl Journal {
             .ok_or_else(|| damaged(peer, "receive an entry"))?;
         let sample = match received {
             Ok(None) => return Ok(None),
-            Ok(Some(sample)) => Port::of(self.subscriber.owner(), sample),
+            Ok(Some(sample)) => Port::with_owner(self.subscriber.owner(), sample),
             Err(error) => {
                 self.connection.peer.check()?;
                 return Err(ProtocolError::transport("receive an entry", error));

@@ -390,7 +390,7 @@ impl Awaited<FrameSample> for Answer<'_> {
             match self.subscriber.receive() {
                 Ok(None) => return Ok(None),
                 Ok(Some(sample)) => {
-                    let sample = Port::of(self.subscriber.owner(), sample);
+                    let sample = Port::with_owner(self.subscriber.owner(), sample);
                     let header = loaned::head(&sample)
                         .ok_or_else(|| damaged(self.peer, "receive a frame"))?;
                     if header.ack_seq == self.seq && header.epoch == self.epoch {

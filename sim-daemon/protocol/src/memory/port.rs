@@ -19,11 +19,11 @@ pub(crate) struct Port<T> {
 
 impl<T> Port<T> {
     pub(crate) fn new(config: &Config, inner: T) -> Port<T> {
-        Port::of(storage::run_of(config), inner)
+        Port::with_owner(storage::run_of(config), inner)
     }
 
     /// One of the run that a number stands for.
-    pub(crate) fn of(owner: u64, inner: T) -> Port<T> {
+    pub(crate) fn with_owner(owner: u64, inner: T) -> Port<T> {
         let inner = ManuallyDrop::new(inner);
         Port { owner, inner }
     }

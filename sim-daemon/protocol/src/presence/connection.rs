@@ -153,7 +153,7 @@ impl Connection {
             let pending = guarded(|| loan.write_from_slice(&text).send())
                 .ok_or_else(damaged)?
                 .map_err(|error| failed(&error))?;
-            Port::of(requester.owner(), pending)
+            Port::with_owner(requester.owner(), pending)
         };
         self.notify();
         let (start, mut nap, mut polled) =
@@ -161,7 +161,7 @@ impl Connection {
         loop {
             let received = guarded(|| pending.receive()).ok_or_else(damaged)?;
             if let Some(response) = received.map_err(|error| failed(&error))? {
-                let response = Port::of(pending.owner(), response);
+                let response = Port::with_owner(pending.owner(), response);
                 intact(&self.peer)?;
                 return serde_json::from_slice(response.payload()).map_err(|error| {
                     ProtocolError::Malformed {

@@ -66,7 +66,7 @@ pub(crate) fn responder<S: Service>(
         .max_loaned_responses_per_request(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create the control server", error))
 }
 

@@ -202,7 +202,7 @@ fn publisher<S: Service, H: Debug + Default + ZeroCopySend>(
         .max_loaned_samples(LOANS)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport(format!("create a {what} publisher"), error))
 }
 
@@ -253,7 +253,7 @@ pub(crate) fn frame_subscriber<S: Service>(
         .buffer_size(BUFFER)
         .history_request(0)
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
 }
 
@@ -286,7 +286,7 @@ pub(crate) fn watch_subscriber<S: Service>(
         .history_request(1)
         .create();
     match subscriber {
-        Ok(port) => Ok(Port::of(service.owner(), port)),
+        Ok(port) => Ok(Port::with_owner(service.owner(), port)),
         Err(SubscriberCreateError::ExceedsMaxSupportedSubscribers) => {
             Err(ProtocolError::TooManyClients {
                 name: name.to_owned(),
@@ -314,7 +314,7 @@ pub(crate) fn command_subscriber<S: Service>(
     service
         .subscriber_builder()
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a command subscriber", error))
 }
 
@@ -355,7 +355,7 @@ pub(crate) fn journal_subscriber<S: Service>(
     service
         .subscriber_builder()
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a journal subscriber", error))
 }
 
@@ -434,7 +434,7 @@ pub(crate) fn listener<S: Service>(service: &EventService<S>) -> Result<Sleeper<
     service
         .listener_builder()
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a listener", error))
 }
 
@@ -443,6 +443,6 @@ pub(crate) fn notifier<S: Service>(service: &EventService<S>) -> Result<Waker<S>
     service
         .notifier_builder()
         .create()
-        .map(|port| Port::of(service.owner(), port))
+        .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create a notifier", error))
 }

@@ -73,7 +73,7 @@ impl<F: Lane> Job<F> {
             places(&own.collect::<Vec<_>>())
         });
         Job {
-            shape: Shape::of(&constants),
+            shape: Shape::from_constants(&constants),
             step: places(&step_stages(&constants)),
             evaluate: places(&evaluation),
             evaluate_now,
@@ -191,12 +191,12 @@ impl<F: Lane> Chunk<F> {
             match values {
                 Values::F32(v) => {
                     for (cell, x) in cells.zip(&v[row..row + columns.len()]) {
-                        *cell = F::Real::of(f64::from(*x));
+                        *cell = F::Real::from_f64(f64::from(*x));
                     }
                 }
                 Values::F64(v) => {
                     for (cell, x) in cells.zip(&v[row..row + columns.len()]) {
-                        *cell = F::Real::of(*x);
+                        *cell = F::Real::from_f64(*x);
                     }
                 }
             }
@@ -239,7 +239,8 @@ impl<F: Lane> Chunk<F> {
             // a quaternion of length 1, up to rounding, keeps its bits
             if (square - 1.0).abs() > 4.0 * F::Real::EPSILON {
                 for i in 0..4 {
-                    self.state[at(i)] = F::Real::of(self.state[at(i)].to_f64() / square.sqrt());
+                    self.state[at(i)] =
+                        F::Real::from_f64(self.state[at(i)].to_f64() / square.sqrt());
                 }
             }
         }

@@ -27,7 +27,7 @@ pub(super) struct Bit {
 
 impl Bit {
     /// The bit with this place in the counts.
-    fn of(place: usize) -> Bit {
+    fn from_place(place: usize) -> Bit {
         let (class, level) = (place / LEVELS, place % LEVELS);
         Bit { class, level }
     }
@@ -75,7 +75,7 @@ impl ContactKinds {
     /// Counts the worlds of a block; `set` says in how many of them a bit is set.
     pub fn count(&mut self, worlds: usize, set: impl Fn(Bit) -> u32) {
         for (k, count) in self.counts.iter_mut().enumerate() {
-            *count += set(Bit::of(k));
+            *count += set(Bit::from_place(k));
         }
         self.worlds += worlds as u32;
     }
@@ -95,7 +95,7 @@ impl ContactKinds {
         self.scores
             .sort_unstable_by(|(one, k), (other, l)| other.total_cmp(one).then(k.cmp(l)));
         self.bits.clear();
-        let ranked = self.scores.iter().map(|(_, k)| Bit::of(*k));
+        let ranked = self.scores.iter().map(|(_, k)| Bit::from_place(*k));
         let own = (0..OWN).map(|place| 1 << (SHARED + OWN - 1 - place));
         self.bits.extend(ranked.clone().zip(own));
         let others = ranked.skip(OWN).filter(|bit| bit.level == 0);

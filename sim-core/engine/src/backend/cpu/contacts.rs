@@ -142,13 +142,13 @@ fn put_real<F: Lane>(
         match field {
             Field::ContactDistance => to[0] = world.number(row, row::DISTANCE),
             Field::ContactNormal => to.copy_from_slice(&world.three(row, row::NORMAL)),
-            Field::ContactForce => to.copy_from_slice(&world.force(row).map(Real::of)),
+            Field::ContactForce => to.copy_from_slice(&world.force(row).map(Real::from_f64)),
             _ => {
                 let origin = &chunk.block.work.reference[contact.class.trees.1];
                 let point = world.three(row, row::POINT);
                 for i in 0..3 {
                     let x = origin[i].lane(world.lane).to_f64() + point[i].to_f64();
-                    to[i] = Real::of(x);
+                    to[i] = Real::from_f64(x);
                 }
             }
         }
@@ -172,7 +172,7 @@ fn add_sensed<'c, F: Lane>(
                     // of few contacts, and so not before
                     let force = world.force(contact.row);
                     for i in 0..3 {
-                        to[i] = Real::of(to[i].to_f64() + sign * force[i]);
+                        to[i] = Real::from_f64(to[i].to_f64() + sign * force[i]);
                     }
                 }
             }
@@ -195,7 +195,7 @@ fn add_forces<'c, F: Lane>(
             let Some(link) = link else { continue };
             for i in 0..3 {
                 let cell = &mut to[3 * link + i];
-                *cell = Real::of(cell.to_f64() + sign * force[i]);
+                *cell = Real::from_f64(cell.to_f64() + sign * force[i]);
             }
         }
     }

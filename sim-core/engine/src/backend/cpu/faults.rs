@@ -57,7 +57,7 @@ impl<F: Lane> Chunk<F> {
                     self.count_frozen(world, fault);
                 }
                 self.status[world] = fault;
-                self.lanes[lane] = F::Real::of(1.0);
+                self.lanes[lane] = F::Real::from_f64(1.0);
                 frozen = true;
             } else {
                 self.steps[world] += 1;

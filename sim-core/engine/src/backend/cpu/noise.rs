@@ -20,7 +20,7 @@ impl<F: Lane> Chunk<F> {
                     let std = self.deviation(shape, world, first + dof);
                     if std > 0.0 {
                         let noise = sample(&self.draw(job, world, stream), dof, std);
-                        self.lanes[lane] = F::Real::of(noise);
+                        self.lanes[lane] = F::Real::from_f64(noise);
                     }
                 }
                 self.block.command_noise[k * shape.dofs + dof] = F::load(&self.lanes);

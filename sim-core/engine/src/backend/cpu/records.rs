@@ -69,10 +69,10 @@ impl<F: Lane> Chunk<F> {
             let state = self.state.iter_mut().skip(first).step_by(F::WIDTH);
             for (x, from) in state.zip(numbers.chunks_exact(size_of::<F::Real>())) {
                 *x = if F::Real::DOUBLE {
-                    F::Real::of(f64::from_le_bytes(array::from_fn(|i| from[i])))
+                    F::Real::from_f64(f64::from_le_bytes(array::from_fn(|i| from[i])))
                 } else {
                     let from = f32::from_le_bytes(array::from_fn(|i| from[i]));
-                    F::Real::of(f64::from(from))
+                    F::Real::from_f64(f64::from(from))
                 };
             }
         }

@@ -77,11 +77,11 @@ impl<F: Lane> Chunk<F> {
             .draw(seed, number, episode, |field, column, value| {
                 let place =
                     self.place(shape, world, crate::backend::state::array_of(field), column);
-                self.state[place] = F::Real::of(value);
+                self.state[place] = F::Real::from_f64(value);
             });
         job.draw.draw_params(seed, number, episode, |k, value| {
             let place = self.place(shape, world, Array::Params, k);
-            self.state[place] = F::Real::of(value);
+            self.state[place] = F::Real::from_f64(value);
         });
     }
 }

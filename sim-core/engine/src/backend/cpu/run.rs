@@ -197,7 +197,7 @@ impl<F: Lane> Chunk<F> {
                         clocks::put(&job.constants, time, row);
                     }
                 }
-                if let Some(noise) = job.noise.of(slot.field) {
+                if let Some(noise) = job.noise.for_field(slot.field) {
                     for lane in self.lanes_of(block) {
                         let world = self.assignment.world(lane);
                         let row = arena.row(slot, self.worlds.start + world);

@@ -203,7 +203,7 @@ impl Gpu {
         {
             last.copy_out(&device, &compiled, drawn, &frame, layout.bytes as u64)?;
         }
-        let shape = Shape::of(m);
+        let shape = Shape::from_constants(m);
         let mut gpu = Gpu {
             shared: None,
             tiles,

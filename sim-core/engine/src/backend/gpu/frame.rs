@@ -32,7 +32,7 @@ impl Gpu {
                 row
             })
             .collect();
-        let place = self.places.of(Array::CommandNoise);
+        let place = self.places.range(Array::CommandNoise);
         self.send(
             &worlds,
             Rows::Fields,
@@ -53,7 +53,7 @@ impl Gpu {
     /// Adds noise to the fields that have some; it is drawn on the host.
     fn add_noise(&self, arena: &mut [u64]) {
         for slot in &self.layout.slots {
-            let Some(noise) = self.noise.of(slot.field) else {
+            let Some(noise) = self.noise.for_field(slot.field) else {
                 continue;
             };
             let columns: usize = slot.shape[1..].iter().product();

@@ -14,7 +14,7 @@ impl Gpu {
     /// Whether the host adds something to a field of each frame: noise, clocks.
     fn is_finished_by_host(&self, slot: &Slot) -> bool {
         let has_clocks = slot.field == Field::Sensordata && clocks::are_in(&self.constants);
-        slot.bytes > 0 && (self.noise.of(slot.field).is_some() || has_clocks)
+        slot.bytes > 0 && (self.noise.for_field(slot.field).is_some() || has_clocks)
     }
 
     /// Runs something of shared memory. An error loses the device.

@@ -144,7 +144,7 @@ impl StagedCommand {
     ) -> Result<Vec<StagedCommand>, BackendError> {
         let staged = commands(m).map(|(input, columns)| {
             let (group, part) = input.place(m, 0..columns);
-            let first = places.of(group).start + part.start as u32;
+            let first = places.range(group).start + part.start as u32;
             let bytes = 4 * columns.max(4) as u64 * u64::from(width);
             let rows = Upload::new(device, "commands", bytes)?;
             let head = [worlds.len() as u32, columns as u32, first, 0];

@@ -10,7 +10,7 @@ use std::ops::Range;
 
 impl Gpu {
     pub(super) fn shape(&self) -> Shape {
-        Shape::of(&self.constants)
+        Shape::from_constants(&self.constants)
     }
 
     /// Sets every lane to the scene's start, padding included.
@@ -134,7 +134,7 @@ impl Gpu {
             Values::F32(v) => v[world * n + k],
             Values::F64(v) => v[world * n + k] as f32,
         };
-        let first = self.places.of(target).start + columns.start as u32;
+        let first = self.places.range(target).start + columns.start as u32;
         self.send(&worlds, Rows::Fields, first, n as u32, |j, to| {
             let mut row: Vec<f32> = (0..n).map(|k| value(worlds[j], k)).collect();
             for quaternion in &quaternions {
@@ -153,11 +153,11 @@ impl Gpu {
                 }
             }
             Array::JointQ | Array::JointQd => {
-                let qdd = self.places.of(Array::JointQdd).start;
+                let qdd = self.places.range(Array::JointQdd).start;
                 let dofs = self.shape().dofs as u32;
                 self.send(&worlds, Rows::Fields, qdd, dofs, |_, to| to.fill(0))?;
                 if target == Array::JointQ {
-                    let rest = self.places.of(Array::JointQRest).start + columns.start as u32;
+                    let rest = self.places.range(Array::JointQRest).start + columns.start as u32;
                     self.send(&worlds, Rows::Fields, rest, n as u32, |_, to| to.fill(0))?;
                 }
             }

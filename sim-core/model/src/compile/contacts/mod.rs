@@ -147,7 +147,7 @@ impl ContactBuilder<'_> {
             let columns = &class.columns;
             for (row, entries) in columns.iter().zip(&mut class.entries) {
                 let place = |column: usize| (column, pattern.at(row.dof, columns[column].dof));
-                *entries = Run::of(entries.iter().flat_map(Run::columns).map(place));
+                *entries = Run::from_columns(entries.iter().flat_map(Run::columns).map(place));
             }
         }
         coupled
@@ -313,7 +313,7 @@ impl ContactBuilder<'_> {
                     lever: pair::LEVERS + c,
                 })
                 .collect(),
-            runs: Run::of(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
+            runs: Run::from_columns(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
             entries,
             couples,
             parts: parts.into_iter().collect(),

@@ -77,7 +77,7 @@ impl<'a> Rules<'a> {
 pub(super) fn geom_of(shape: &PlacedShape<'_>) -> GeomContact {
     match shape.geom {
         Some(geom) => *geom,
-        None => GeomContact::of(&shape.surface),
+        None => GeomContact::from_surface(&shape.surface),
     }
 }
 

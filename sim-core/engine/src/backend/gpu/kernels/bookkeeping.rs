@@ -44,7 +44,7 @@ pub(in crate::backend::gpu) fn begin(places: &Places, saves: bool) -> String {
         );
     }
     for slot in [Array::Unconverged, Array::LeftOut, Array::Substep] {
-        clear(&mut wgsl, places.of(slot));
+        clear(&mut wgsl, places.range(slot));
     }
     wgsl + "}\n"
 }
@@ -59,7 +59,7 @@ pub(in crate::backend::gpu) fn check_faults(
     let mut wgsl = HEAD.to_owned();
     wgsl += "    var lost = false;\n    var outside = false;\n";
     for (slot, bound) in [(Array::JointQ, 0), (Array::JointQd, 1)] {
-        let Range { start, end } = places.of(slot);
+        let Range { start, end } = places.range(slot);
         let _ = write!(
             wgsl,
             "    for (var i = {start}u; i < {end}u; i++) {{
@@ -70,7 +70,7 @@ pub(in crate::backend::gpu) fn check_faults(
 "
         );
     }
-    let q = places.of(Array::JointQ).start;
+    let q = places.range(Array::JointQ).start;
     for first in m.quaternions() {
         let part = |k: usize| format!("bitcast<f32>(number({}u, w))", q + (first + k) as u32);
         // a rotation that overflows leaves a quaternion of zeros
@@ -86,7 +86,7 @@ pub(in crate::backend::gpu) fn check_faults(
     }
     let (not_finite, bounds, frozen) = (status::NOT_FINITE, status::OUT_OF_BOUNDS, status::FROZEN);
     let converged = status::NOT_CONVERGED;
-    let unconverged = places.of(Array::Unconverged).start;
+    let unconverged = places.range(Array::Unconverged).start;
     let (quads, before) = (places.moving / 4, places.before / 4);
     let count = match counts {
         true => count_left_out(places),
@@ -110,7 +110,7 @@ pub(in crate::backend::gpu) fn check_faults(
 "
     );
     // outputs are a function of the state: the noise of the next frame is not drawn yet
-    clear(&mut wgsl, places.of(Array::CommandNoise));
+    clear(&mut wgsl, places.range(Array::CommandNoise));
     age(&mut wgsl, places, m);
     wgsl + "}\n"
 }
@@ -120,7 +120,7 @@ fn age(wgsl: &mut String, places: &Places, m: &Constants<f32>) {
     if m.delay.frames == 0 {
         return;
     }
-    let history = places.of(Array::CommandHistory);
+    let history = places.range(Array::CommandHistory);
     let dofs = m.dofs.len() as u32;
     let frozen = status::FROZEN;
     let _ = write!(
@@ -140,17 +140,17 @@ fn age(wgsl: &mut String, places: &Places, m: &Constants<f32>) {
             wgsl,
             "        for (var i = 0u; i < {dofs}u; i++) {{ put({}u + i, w, number({}u + i, w)); }}",
             history.start + k as u32 * dofs,
-            places.of(group).start,
+            places.range(group).start,
         );
     }
     *wgsl += "    }\n";
-    clear(wgsl, places.of(Array::Substep));
+    clear(wgsl, places.range(Array::Substep));
 }
 
 /// Counts in `count` the contacts that did not fit, after a detection of contacts that a world's state keeps.
 pub(in crate::backend::gpu) fn count_left_out(places: &Places) -> String {
     let (frozen, bit) = (status::FROZEN, status::CONTACTS_LEFT_OUT);
-    let left_out = places.of(Array::LeftOut).start;
+    let left_out = places.range(Array::LeftOut).start;
     format!(
         "    count.w = select(u32(bitcast<f32>(number({left_out}u, w))), 0u, (count.z & {frozen}u) != 0u);
     count.z = select(count.z & ~{bit}u, count.z | {bit}u, count.w > 0u);

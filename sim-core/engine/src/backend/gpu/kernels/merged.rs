@@ -174,7 +174,7 @@ fn class(
     };
     let entries = entries.into_iter().enumerate().map(|(c, others)| {
         let at = |o: usize| pattern.at(columns[c].0, columns[o].0);
-        Run::of(others.into_iter().map(|o| (o, at(o))))
+        Run::from_columns(others.into_iter().map(|o| (o, at(o))))
     });
     let numbers = t.handles.pair_numbers;
     let pairs = (0..t.pairs.len()).filter(|&p| t.pairs[p].class == number);
@@ -196,7 +196,7 @@ fn class(
                 lever: pair::LEVERS + c,
             })
             .collect(),
-        runs: Run::of(of_dofs),
+        runs: Run::from_columns(of_dofs),
         entries: entries.collect(),
         couples,
         parts: parts.into_iter().collect(),

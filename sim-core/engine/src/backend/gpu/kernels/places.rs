@@ -73,7 +73,7 @@ impl Places {
     }
 
     /// The numbers of an array.
-    pub fn of(&self, array: Array) -> Range<u32> {
+    pub fn range(&self, array: Array) -> Range<u32> {
         let found = self.arrays.iter().find(|(known, _)| *known == array);
         found
             .map(|(_, place)| place.clone())
@@ -91,7 +91,7 @@ impl Places {
         let mut places = vec![0; shape.total()];
         for array in RECORD {
             let first = shape.start(array);
-            for (k, place) in self.of(array).enumerate() {
+            for (k, place) in self.range(array).enumerate() {
                 places[first + k] = place;
             }
         }

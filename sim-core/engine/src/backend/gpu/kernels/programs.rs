@@ -215,8 +215,11 @@ fn step(
         }
         Vec::new()
     })?;
-    let inputs = reads.iter().flat_map(|array| places.of(*array)).collect();
-    let outputs = kept.iter().flat_map(|array| places.of(*array)).collect();
+    let inputs = reads
+        .iter()
+        .flat_map(|array| places.range(*array))
+        .collect();
+    let outputs = kept.iter().flat_map(|array| places.range(*array)).collect();
     Ok((recording, options(inputs, outputs)))
 }
 
@@ -242,7 +245,10 @@ fn evaluation(
         }
         rows
     })?;
-    let inputs = reads.iter().flat_map(|array| places.of(*array)).collect();
+    let inputs = reads
+        .iter()
+        .flat_map(|array| places.range(*array))
+        .collect();
     let mut outputs = Vec::new();
     for array in &writes {
         match array {
@@ -251,7 +257,7 @@ fn evaluation(
                 let first = places.shown_qdd;
                 outputs.extend(first..first + m.dofs.len() as u32);
             }
-            _ => outputs.extend(places.of(*array)),
+            _ => outputs.extend(places.range(*array)),
         }
     }
     for &(field, numbers) in computed {

@@ -60,7 +60,7 @@ fn sources(
         Source::Array(Array::JointQdd) => {
             Some(places.shown_qdd..places.shown_qdd + m.dofs.len() as u32)
         }
-        Source::Array(array) => Some(places.of(array)),
+        Source::Array(array) => Some(places.range(array)),
         Source::Computed(_) => {
             let first = places.computed(field);
             Some(first..first + elements as u32)
@@ -299,7 +299,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
         );
     }
     for (k, class) in m.contacts.classes.iter().enumerate() {
-        let reference = places.of(Array::Reference).start + 3 * class.trees.1 as u32;
+        let reference = places.range(Array::Reference).start + 3 * class.trees.1 as u32;
         let _ = write!(
             text,
             "    let end{k} = min(u32(kept({}u, w)), {}u);

@@ -181,7 +181,7 @@ impl Compaction {
         clear
     }
 
-    fn of(&self, exited: u32) -> &[Program; 2] {
+    fn list_programs(&self, exited: u32) -> &[Program; 2] {
         let mut loops = self.programs.iter().flat_map(|(_, loops)| loops);
         let found = loops.find(|(one, _)| one.exited == exited);
         found.map(|(_, programs)| programs).expect("a known loop")
@@ -222,7 +222,7 @@ type Bound<'a> = (u32, &'a Buffer, Range<u64>);
 
 impl ActiveWorlds {
     /// Header and list of an iteration, from binding `first` on.
-    fn of(&self, iteration: usize, first: u32) -> [Bound<'_>; 2] {
+    fn header_and_list(&self, iteration: usize, first: u32) -> [Bound<'_>; 2] {
         let (buffer, at) = self.groups(iteration);
         [
             (first, buffer, at..at + 4 * HEADER),
@@ -232,7 +232,7 @@ impl ActiveWorlds {
 
     /// Bindings of a kernel of an iteration.
     pub fn bindings(&self, iteration: usize) -> [Bound<'_>; 2] {
-        self.of(iteration, 4)
+        self.header_and_list(iteration, 4)
     }
 
     /// Where the number of workgroups of an iteration stands.
@@ -255,9 +255,9 @@ impl ActiveWorlds {
         let [even, odd] = &self.buffers;
         let both = [(0, even, 0..self.list), (1, odd, 0..self.list)];
         batch.dispatch(compaction.clear(), &both, 1);
-        let [header, list] = self.of(0, 3);
+        let [header, list] = self.header_and_list(0, 3);
         let bindings = [(0, fields, 0..fields.bytes()), header, list];
-        batch.dispatch(&compaction.of(exited)[0], &bindings, groups);
+        batch.dispatch(&compaction.list_programs(exited)[0], &bindings, groups);
     }
 
     /// Lists the worlds of the next iteration.
@@ -269,8 +269,10 @@ impl ActiveWorlds {
         fields: &Buffer,
         iteration: usize,
     ) {
-        let ([header, list], [next, next_list]) =
-            (self.of(iteration, 1), self.of(iteration + 1, 3));
+        let ([header, list], [next, next_list]) = (
+            self.header_and_list(iteration, 1),
+            self.header_and_list(iteration + 1, 3),
+        );
         let bindings = [
             (0, fields, 0..fields.bytes()),
             header,
@@ -279,6 +281,6 @@ impl ActiveWorlds {
             next_list,
         ];
         let (found, at) = self.groups(iteration);
-        batch.dispatch_found(&compaction.of(exited)[1], &bindings, found, at);
+        batch.dispatch_found(&compaction.list_programs(exited)[1], &bindings, found, at);
     }
 }
