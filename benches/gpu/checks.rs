@@ -69,10 +69,10 @@ fn has_same_bits(place: &Place, scene: Scene, counts: &[usize]) -> anyhow::Resul
     sets.push(vec![last, 2, 0, many / 2, 1, 5, 3]);
     sets.push(vec![last]);
     for ids in &sets {
-        let found = bits(place, &plan, &WorldSet::some(ids, many))?;
-        for (id, found) in ids.iter().zip(found) {
+        let states = bits(place, &plan, &WorldSet::some(ids, many))?;
+        for (id, state) in ids.iter().zip(states) {
             ensure!(
-                found == all[*id],
+                state == all[*id],
                 "{name}: world {id} of {many} has other bits among {}",
                 ids.len()
             );
@@ -115,15 +115,15 @@ fn deviation(place: &Place, scene: Scene, recorded: &str) -> anyhow::Result<[f64
 
 /// Positions and velocities of each world after some frames.
 fn bits(place: &Place, plan: &Plan, crowd: &WorldSet) -> anyhow::Result<Vec<Vec<u32>>> {
-    let mut found = Vec::new();
+    let mut states = Vec::new();
     let (coords, dofs) = (plan.model.coords(), plan.model.dofs());
     run(place, plan, crowd, FRAMES, |_, shown| {
         let (q, qd) = shown.split_at(coords * crowd.len());
-        found = (q.chunks_exact(coords).zip(qd.chunks_exact(dofs)))
+        states = (q.chunks_exact(coords).zip(qd.chunks_exact(dofs)))
             .map(|(q, qd)| q.iter().chain(qd).map(|x| x.to_bits()).collect())
             .collect();
     })?;
-    Ok(found)
+    Ok(states)
 }
 
 /// Runs frames and shows `joint_q` of all worlds, then `joint_qd`.

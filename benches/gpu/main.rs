@@ -80,10 +80,10 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = &arguments.build_in {
         return build_time::build_and_print(&arguments, &info, folder);
     }
-    let own = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
-    let cache = arguments.cache.as_ref().unwrap_or(&own);
+    let temporary_cache = std::env::temp_dir().join(format!("gpu-bench-{}", std::process::id()));
+    let cache = arguments.cache.as_ref().unwrap_or(&temporary_cache);
     let done = run(&arguments, &info, &Place::new(&arguments, &info, cache));
-    let _ = std::fs::remove_dir_all(own);
+    let _ = std::fs::remove_dir_all(temporary_cache);
     done
 }
 
@@ -160,11 +160,11 @@ fn chosen(wanted: Option<&str>) -> anyhow::Result<AdapterInfo> {
         Some((_, Ok(index))) => info.index == index,
         Some((name, Err(_))) => info.name.to_lowercase().contains(&name.to_lowercase()),
     };
-    let mut found = adapters();
-    let names: Vec<&str> = found.iter().map(|info| info.name.as_str()).collect();
-    let place = found.iter().position(is_meant);
+    let mut adapters = adapters();
+    let names: Vec<&str> = adapters.iter().map(|info| info.name.as_str()).collect();
+    let place = adapters.iter().position(is_meant);
     let place = place.with_context(|| format!("no such adapter; there are: {names:?}"))?;
-    Ok(found.swap_remove(place))
+    Ok(adapters.swap_remove(place))
 }
 
 /// Builds worlds; also how long it took until they had made a frame [s]: some drivers compile when they run.
@@ -181,17 +181,17 @@ fn build(plan: &Plan, options: &Options) -> anyhow::Result<(Simulation, f64)> {
 fn replay(place: &Place, plan: &Plan, arguments: &Arguments) -> anyhow::Result<[f64; 2]> {
     let wanted = Duration::from_secs_f64(arguments.seconds);
     let crowd = WorldSet::all(REPLAY_WORLDS);
-    let mut found = [0.0; 2];
-    for (found, replay) in found.iter_mut().zip([Replay::Recorded, Replay::Encoded]) {
+    let mut medians = [0.0; 2];
+    for (median, replay) in medians.iter_mut().zip([Replay::Recorded, Replay::Encoded]) {
         let options = Options {
             replay,
             ..options(place, REPLAY_WORLDS, &FIELDS)
         };
         let (mut sim, _) = build(plan, &options)?;
         let mut words = vec![0; sim.layout().bytes / 8];
-        *found = Frames::measure(&mut sim, plan, &crowd, &mut words, wanted)?.thread_us(0.5);
+        *median = Frames::measure(&mut sim, plan, &crowd, &mut words, wanted)?.thread_us(0.5);
     }
-    Ok(found)
+    Ok(medians)
 }
 
 /// The adapter's side of a scene with so many worlds, but for its replay.

@@ -37,7 +37,7 @@ impl Frames {
             sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
             sim.step(words);
         }
-        let mut found = Frames::default();
+        let mut frames = Frames::default();
         let mut spent = 0.0;
         while spent < wanted.as_secs_f64() {
             plan.start(sim, crowd);
@@ -46,11 +46,11 @@ impl Frames {
                 let (wall, thread) = (Instant::now(), thread_seconds());
                 sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
                 sim.step(words);
-                found.thread.push(thread_seconds() - thread);
-                found.wall.push(wall.elapsed().as_secs_f64());
-                spent += found.wall[found.wall.len() - 1];
+                frames.thread.push(thread_seconds() - thread);
+                frames.wall.push(wall.elapsed().as_secs_f64());
+                spent += frames.wall[frames.wall.len() - 1];
                 if spent > (wanted * PATIENCE).as_secs_f64() && frame + 1 < plan.frames() {
-                    found.is_cut = true;
+                    frames.is_cut = true;
                     break;
                 }
             }
@@ -58,8 +58,8 @@ impl Frames {
         if let Some(lost) = sim.lost() {
             anyhow::bail!("{}: {lost}", plan.scene.name());
         }
-        found.sort();
-        Ok(found)
+        frames.sort();
+        Ok(frames)
     }
 
     fn sort(&mut self) {
