@@ -343,8 +343,8 @@ impl Advice {
             let width = of.columns.len();
             let turns = worlds(of, mask).any(|world| {
                 let part = |at: usize| number(&of.values, world * width + place.start + at);
-                let own: [f64; 4] = std::array::from_fn(part);
-                own != last && own != first
+                let quat: [f64; 4] = std::array::from_fn(part);
+                quat != last && quat != first
             });
             if turns {
                 self.turned.store(true, Ordering::Relaxed);
@@ -428,8 +428,8 @@ fn aimless<'a>(
             "joint_target_qd" => 2,
             _ => return None,
         };
-        let own = description.driven.get(of.columns.clone())?;
-        let is_in_vain = !own.is_empty() && own.iter().all(|follows| follows & bit == 0);
+        let driven = description.driven.get(of.columns.clone())?;
+        let is_in_vain = !driven.is_empty() && driven.iter().all(|follows| follows & bit == 0);
         is_in_vain.then(|| (of.field, of.columns.clone()))
     })
 }
@@ -438,9 +438,9 @@ fn aimless<'a>(
 #[cold]
 fn of_targets(description: &Description, field: &str, dofs: &Range<usize>) -> String {
     let robots = description.robots.iter();
-    let own = robots.filter(|robot| robot.dofs[0] < dofs.end && dofs.start < robot.dofs[1]);
+    let owners = robots.filter(|robot| robot.dofs[0] < dofs.end && dofs.start < robot.dofs[1]);
     let (models, others): (Vec<&RobotRange>, Vec<&RobotRange>) =
-        own.partition(|robot| robot.is_mujoco);
+        owners.partition(|robot| robot.is_mujoco);
     let gains = match field {
         "joint_target_q" => "joint_target_ke and joint_target_kd",
         _ => "joint_target_kd, and joint_target_mode \"velocity\" or \"both\",",

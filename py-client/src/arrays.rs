@@ -101,7 +101,7 @@ fn pack_into<O: Number>(
         return Err(raise(py, "ArgumentError", problem));
     }
     // every number is looked at, which is faster than to stop at the first
-    Ok(out.iter().fold(false, |found, x| found | x.is_nan()))
+    Ok(out.iter().fold(false, |has_nan, x| has_nan | x.is_nan()))
 }
 
 /// Copies a part into the columns from `first` on; how many it has, or `None` if its type or shape is another.

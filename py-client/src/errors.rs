@@ -6,11 +6,11 @@ use sim_protocol::{ProtocolError, RefusalKind};
 
 /// The exception class `tightloop.errors.<class>` with a message.
 pub(crate) fn raise(py: Python<'_>, class: &str, message: impl Into<String>) -> PyErr {
-    let found = py
+    let exception = py
         .import("tightloop.errors")
         .and_then(|errors| errors.getattr(class))
         .and_then(|class| Ok(class.cast_into::<PyType>()?));
-    match found {
+    match exception {
         Ok(class) => PyErr::from_type(class, (message.into(),)),
         Err(error) => error,
     }

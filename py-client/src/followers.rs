@@ -24,17 +24,26 @@ pub(crate) struct Followers(Vec<Follower>);
 
 impl Followers {
     pub(crate) fn new(description: &Description) -> Followers {
-        let place = |names: &[String], name: &String| names.iter().position(|own| own == name);
-        let drives = |dof: usize| description.driven.get(dof).is_some_and(|own| own & 1 != 0);
-        let places = description.followers.iter().filter_map(|own| {
-            let of =
-                |names: &[String]| Some([place(names, &own.name)?, place(names, &own.leader)?]);
-            let dofs = of(&description.dof_names)?;
+        let place = |names: &[String], name: &String| names.iter().position(|other| other == name);
+        let drives = |dof: usize| {
+            description
+                .driven
+                .get(dof)
+                .is_some_and(|flags| flags & 1 != 0)
+        };
+        let places = description.followers.iter().filter_map(|follower| {
+            let indices = |names: &[String]| {
+                Some([
+                    place(names, &follower.name)?,
+                    place(names, &follower.leader)?,
+                ])
+            };
+            let dofs = indices(&description.dof_names)?;
             Some(Follower {
                 dofs,
-                coords: of(&description.coord_names)?,
-                multiplier: own.multiplier,
-                offset: own.offset,
+                coords: indices(&description.coord_names)?,
+                multiplier: follower.multiplier,
+                offset: follower.offset,
                 is_driven: dofs.into_iter().all(drives),
             })
         });
@@ -43,7 +52,7 @@ impl Followers {
 
     /// Whether a dof follows another one.
     pub(crate) fn has(&self, dof: usize) -> bool {
-        self.0.iter().any(|own| own.dofs[0] == dof)
+        self.0.iter().any(|follower| follower.dofs[0] == dof)
     }
 
     /// What is wrong with an array of `joint_q` or `joint_target_q`, with the cure.
@@ -54,21 +63,24 @@ impl Followers {
         description: &Description,
     ) -> Option<String> {
         let is_target = of.field == "joint_target_q";
-        self.0.iter().find_map(|own| {
-            let [place, leader] = if is_target { own.dofs } else { own.coords };
+        self.0.iter().find_map(|follower| {
+            let [place, leader] = if is_target { follower.dofs } else { follower.coords };
             let is_given = of.columns.contains(&place) && of.columns.contains(&leader);
-            if !is_given || (is_target && !own.is_driven) {
+            if !is_given || (is_target && !follower.is_driven) {
                 return None;
             }
             let slack = if is_target { TARGET } else { POSITION };
             let width = of.columns.len();
             worlds(of, mask).find_map(|world| {
                 let value = |at| number(&of.values, world * width + at - of.columns.start);
-                let (here, there) = (value(place), own.offset + own.multiplier * value(leader));
+                let (here, there) = (
+                    value(place),
+                    follower.offset + follower.multiplier * value(leader),
+                );
                 let names = &description.dof_names;
                 ((here - there).abs() > slack).then(|| {
-                    let (name, field) = (&names[own.dofs[0]], of.field);
-                    let leader = &names[own.dofs[1]];
+                    let (name, field) = (&names[follower.dofs[0]], of.field);
+                    let leader = &names[follower.dofs[1]];
                     let reason = match is_target {
                         true => "their drives work against each other",
                         false => "the constraint pulls at both",

@@ -161,13 +161,13 @@ impl PyFrame {
         name: &str,
         method: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (py, own) = (slf.py(), slf.get());
-        let sample = own.sample.bind(py);
+        let (py, py_frame) = (slf.py(), slf.get());
+        let sample = py_frame.sample.bind(py);
         let frame = &sample.get().0;
         if frame.field(name).is_err() {
-            return Err(own.unknown(py, name)?);
+            return Err(py_frame.unknown(py, name)?);
         }
-        let Some(card) = own.card.get() else {
+        let Some(card) = py_frame.card.get() else {
             let problem = format!(
                 "`{name}` of this frame is not on a GPU that this process sees: call `sim.keep_on_gpu()` once after the \
                  launch, and take the tensors of frames that come after it"

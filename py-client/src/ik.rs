@@ -124,14 +124,14 @@ impl IkTaskSolver {
             true => py.detach(|| solve(&|| false)),
             false => interruptible(py, solve)?,
         };
-        let (q, found) = solved.map_err(|error| refused(py, &error))?;
+        let (q, solutions) = solved.map_err(|error| refused(py, &error))?;
         Ok((
             PyArray1::from_vec(py, q),
-            PyArray1::from_iter(py, found.iter().map(|one| one.is_solved)),
-            PyArray1::from_iter(py, found.iter().map(|one| one.position_error)),
-            PyArray1::from_iter(py, found.iter().map(|one| one.rotation_error)),
-            PyArray1::from_iter(py, found.iter().map(|one| one.iterations)),
-            PyArray1::from_iter(py, found.iter().map(|one| one.restarts)),
+            PyArray1::from_iter(py, solutions.iter().map(|solution| solution.is_solved)),
+            PyArray1::from_iter(py, solutions.iter().map(|solution| solution.position_error)),
+            PyArray1::from_iter(py, solutions.iter().map(|solution| solution.rotation_error)),
+            PyArray1::from_iter(py, solutions.iter().map(|solution| solution.iterations)),
+            PyArray1::from_iter(py, solutions.iter().map(|solution| solution.restarts)),
         ))
     }
 }

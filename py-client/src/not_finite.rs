@@ -14,8 +14,8 @@ pub(crate) struct NotFinite(Mutex<Option<Culprit>>);
 impl NotFinite {
     /// Looks through the arrays of a step.
     pub(crate) fn look(&self, description: &Description, commands: &[Command<'_>]) {
-        let found = commands.iter().find_map(|of| culprit(description, of));
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        let culprit = commands.iter().find_map(|of| culprit(description, of));
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = culprit;
     }
 
     /// What the last step had.

@@ -22,9 +22,9 @@ pub(crate) fn parts<'py>(
     folder: PathBuf,
 ) -> PyResult<(String, Vec<Surface<'py>>)> {
     let scene = scene.to_owned();
-    let found = abandonable(py, move || config::parse(&scene, "scene")?.parts(&folder));
-    let found = found?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
-    let surfaces = found.meshes.iter().map(|mesh| {
+    let parts = abandonable(py, move || config::parse(&scene, "scene")?.parts(&folder));
+    let parts = parts?.map_err(|error| raise(py, "SceneError", error.to_string()))?;
+    let surfaces = parts.meshes.iter().map(|mesh| {
         let corners = mesh.vertices.as_flattened();
         let corners = PyArray1::from_iter(py, corners.iter().map(|&part| part as f32));
         Ok((
@@ -32,7 +32,7 @@ pub(crate) fn parts<'py>(
             rows(py, &mesh.triangles)?,
         ))
     });
-    Ok((found.told.to_string(), surfaces.collect::<PyResult<_>>()?))
+    Ok((parts.told.to_string(), surfaces.collect::<PyResult<_>>()?))
 }
 
 /// A mesh file as it looks ([`VisualMesh`]), its arrays by name; `textures` is a list of dicts, `image` a path or bytes.
@@ -50,32 +50,32 @@ pub(crate) fn visual_mesh(
     let textures: Vec<_> = mesh
         .textures
         .iter()
-        .map(|own| texture(py, own))
+        .map(|source| texture(py, source))
         .collect::<PyResult<_>>()?;
-    let found = PyDict::new(py);
-    found.set_item("vertices", rows(py, &mesh.vertices)?)?;
-    found.set_item("faces", rows(py, &mesh.triangles)?)?;
-    found.set_item("colors", rows(py, &colors)?)?;
-    found.set_item("painted", PyArray1::from_iter(py, painted))?;
-    found.set_item("textures", textures)?;
-    found.set_item("notes", mesh.notes)?;
-    found.set_item("ignored_up_axis", mesh.ignored_up_axis)?;
-    Ok(found)
+    let dict = PyDict::new(py);
+    dict.set_item("vertices", rows(py, &mesh.vertices)?)?;
+    dict.set_item("faces", rows(py, &mesh.triangles)?)?;
+    dict.set_item("colors", rows(py, &colors)?)?;
+    dict.set_item("painted", PyArray1::from_iter(py, painted))?;
+    dict.set_item("textures", textures)?;
+    dict.set_item("notes", mesh.notes)?;
+    dict.set_item("ignored_up_axis", mesh.ignored_up_axis)?;
+    Ok(dict)
 }
 
 fn texture<'py>(py: Python<'py>, texture: &Texture) -> PyResult<Bound<'py, PyDict>> {
     let uv = texture.uv.as_ref().map(|uv| {
         PyArray1::from_slice(py, uv.as_flattened().as_flattened()).reshape([uv.len(), 3, 2])
     });
-    let found = PyDict::new(py);
+    let dict = PyDict::new(py);
     match &texture.image {
-        Image::File(path) => found.set_item("image", path.as_os_str())?,
-        Image::Bytes(bytes) => found.set_item("image", PyBytes::new(py, bytes))?,
+        Image::File(path) => dict.set_item("image", path.as_os_str())?,
+        Image::Bytes(bytes) => dict.set_item("image", PyBytes::new(py, bytes))?,
     }
-    found.set_item("faces", PyArray1::from_slice(py, &texture.triangles))?;
-    found.set_item("uv", uv.transpose()?)?;
-    found.set_item("tints", rows(py, &texture.tints)?)?;
-    Ok(found)
+    dict.set_item("faces", PyArray1::from_slice(py, &texture.triangles))?;
+    dict.set_item("uv", uv.transpose()?)?;
+    dict.set_item("tints", rows(py, &texture.tints)?)?;
+    Ok(dict)
 }
 
 fn rows<'py, T: Element + Copy, const N: usize>(

@@ -43,19 +43,19 @@ impl RayScene {
     /// Lists about the geoms: `name`, `kind`, `group` (None where the file has no groups), `has_shape`, `is_static` and
     /// `is_visible`.
     fn geoms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = PyDict::new(py);
+        let dict = PyDict::new(py);
         let all = &self.0.geoms;
         let flags = |of: fn(&RayGeom) -> bool| all.iter().map(of).collect::<Vec<bool>>();
         let names: Vec<_> = all.iter().map(|geom| geom.name.as_str()).collect();
         let kinds: Vec<_> = all.iter().map(|geom| geom.kind.as_str()).collect();
         let groups: Vec<_> = all.iter().map(|geom| geom.group).collect();
-        found.set_item("name", names)?;
-        found.set_item("kind", kinds)?;
-        found.set_item("group", groups)?;
-        found.set_item("has_shape", flags(|geom| geom.shape.is_some()))?;
-        found.set_item("is_static", flags(|geom| geom.is_static))?;
-        found.set_item("is_visible", flags(|geom| geom.is_visible))?;
-        Ok(found)
+        dict.set_item("name", names)?;
+        dict.set_item("kind", kinds)?;
+        dict.set_item("group", groups)?;
+        dict.set_item("has_shape", flags(|geom| geom.shape.is_some()))?;
+        dict.set_item("is_static", flags(|geom| geom.is_static))?;
+        dict.set_item("is_visible", flags(|geom| geom.is_visible))?;
+        Ok(dict)
     }
 
     /// What rays meet in worlds. `chosen` are the geoms that count.
