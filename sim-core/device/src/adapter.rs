@@ -89,38 +89,38 @@ pub(crate) fn list() -> Vec<(wgpu::Adapter, AdapterInfo)> {
     options.flags = wgpu::InstanceFlags::empty();
     let backends = options.backends;
     let instance = wgpu::Instance::new(options);
-    let mut found: Vec<_> = ready(instance.enumerate_adapters(backends))
+    let mut adapters: Vec<_> = ready(instance.enumerate_adapters(backends))
         .into_iter()
         .map(|adapter| {
             let info = describe(&adapter);
             (adapter, info)
         })
         .collect();
-    found.sort_by_key(|(_, info)| info.kind);
-    for (index, (_, info)) in found.iter_mut().enumerate() {
+    adapters.sort_by_key(|(_, info)| info.kind);
+    for (index, (_, info)) in adapters.iter_mut().enumerate() {
         info.index = index;
     }
-    found
+    adapters
 }
 
 /// The chosen adapter.
 pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), DeviceError> {
-    let mut found = list();
+    let mut adapters = list();
     let place = match choice {
-        Choice::First => (!found.is_empty()).then_some(0),
-        Choice::Index(index) => (*index < found.len()).then_some(*index),
+        Choice::First => (!adapters.is_empty()).then_some(0),
+        Choice::Index(index) => (*index < adapters.len()).then_some(*index),
         Choice::Name(name) => {
             let name = name.to_lowercase();
-            found
+            adapters
                 .iter()
                 .position(|(_, info)| info.name.to_lowercase().contains(&name))
         }
     };
-    if found.is_empty() {
+    if adapters.is_empty() {
         return Err(DeviceError::NoAdapter);
     }
     let Some(place) = place else {
-        let present: Vec<String> = found
+        let present: Vec<String> = adapters
             .iter()
             .map(|(_, info)| format!("{} `{}`", info.index, info.name))
             .collect();
@@ -133,7 +133,7 @@ pub(crate) fn choose(choice: &Choice) -> Result<(wgpu::Adapter, AdapterInfo), De
             present: present.join(", "),
         });
     };
-    let (adapter, mut info) = found.swap_remove(place);
+    let (adapter, mut info) = adapters.swap_remove(place);
     if OPENS_AS_DISCRETE.get() {
         info.kind = AdapterKind::Discrete;
     }

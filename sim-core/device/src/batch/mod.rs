@@ -93,26 +93,26 @@ impl BatchBuilder {
         }
     }
 
-    /// As `dispatch`, with the number of workgroups that an earlier command wrote: three `u32` at a byte of `found`. The last two are 1.
-    /// The first is at most the adapter's limit, and may be 0.
+    /// As `dispatch`, with the number of workgroups that an earlier command wrote: three `u32` at a byte of `indirect`.
+    /// The last two are 1. The first is at most the adapter's limit, and may be 0.
     pub fn dispatch_found(
         &mut self,
         program: &Program,
         buffers: &[(u32, &Buffer, Range<u64>)],
-        found: &Buffer,
+        indirect: &Buffer,
         at: u64,
     ) {
-        if !Arc::ptr_eq(&found.0.device, &self.device) {
-            let reason = format!("`{}` is another device's", found.label());
+        if !Arc::ptr_eq(&indirect.0.device, &self.device) {
+            let reason = format!("`{}` is another device's", indirect.label());
             return self.fail(program.label(), reason);
         }
-        if !at.is_multiple_of(4) || at.checked_add(12).is_none_or(|end| end > found.bytes()) {
-            let bytes = found.bytes();
+        if !at.is_multiple_of(4) || at.checked_add(12).is_none_or(|end| end > indirect.bytes()) {
+            let bytes = indirect.bytes();
             let reason = format!("numbers of workgroups at {at} of {bytes} bytes");
             return self.fail(program.label(), reason);
         }
         let groups = Groups::Found {
-            buffer: found.0.clone(),
+            buffer: indirect.0.clone(),
             at,
         };
         match self.slots(program, buffers) {
@@ -120,11 +120,11 @@ impl BatchBuilder {
             Ok(slots)
                 if slots
                     .iter()
-                    .any(|slot| !slot.read_only && Arc::ptr_eq(&slot.buffer, &found.0)) =>
+                    .any(|slot| !slot.read_only && Arc::ptr_eq(&slot.buffer, &indirect.0)) =>
             {
                 let reason = format!(
                     "it writes `{}`, which says how many workgroups run",
-                    found.label()
+                    indirect.label()
                 );
                 self.fail(program.label(), reason);
             }

@@ -94,14 +94,14 @@ impl BatchOp {
 
 /// The staging buffers of some commands, without repetition.
 pub(crate) fn staged_buffers(ops: &[BatchOp]) -> Vec<Staged> {
-    let mut found: Vec<Staged> = Vec::new();
+    let mut buffers: Vec<Staged> = Vec::new();
     let mut note = |memory: &Arc<Memory>, written: bool| {
         if memory.host.is_none() {
             return;
         }
-        match found.iter_mut().find(|s| Arc::ptr_eq(&s.memory, memory)) {
+        match buffers.iter_mut().find(|s| Arc::ptr_eq(&s.memory, memory)) {
             Some(staged) => staged.written |= written,
-            None => found.push(Staged {
+            None => buffers.push(Staged {
                 memory: memory.clone(),
                 written,
             }),
@@ -123,5 +123,5 @@ pub(crate) fn staged_buffers(ops: &[BatchOp]) -> Vec<Staged> {
             }
         }
     }
-    found
+    buffers
 }

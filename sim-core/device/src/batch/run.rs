@@ -189,15 +189,15 @@ impl Inner {
 
 /// The staging buffers of several batches, without repetition.
 fn distinct(batches: &[&Batch]) -> Vec<Staged> {
-    let mut found: Vec<Staged> = Vec::new();
+    let mut buffers: Vec<Staged> = Vec::new();
     for staged in batches.iter().flat_map(|batch| &batch.staging) {
-        match found
+        match buffers
             .iter_mut()
             .find(|other| Arc::ptr_eq(&other.memory, &staged.memory))
         {
             Some(other) => other.written |= staged.written,
-            None => found.push(staged.clone()),
+            None => buffers.push(staged.clone()),
         }
     }
-    found
+    buffers
 }

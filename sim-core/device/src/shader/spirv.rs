@@ -92,20 +92,22 @@ pub(crate) fn patched(words: &[u32]) -> Vec<u32> {
 /// Gives the barriers of subgroups, whose semantics stand at these places, a constant that names storage buffers.
 fn order_storage(words: &mut Vec<u32>, constants: &[Constant], barriers: &[usize]) {
     let known = |place: &&usize| {
-        let found = constants.iter().find(|one| one.id == words[**place]);
-        found.filter(|one| one.value & SUBGROUP_MEMORY != 0)
+        let constant = constants
+            .iter()
+            .find(|constant| constant.id == words[**place]);
+        constant.filter(|constant| constant.value & SUBGROUP_MEMORY != 0)
     };
-    let own: Vec<usize> = barriers
+    let subgroup_barriers: Vec<usize> = barriers
         .iter()
         .filter(|place| known(place).is_some())
         .copied()
         .collect();
-    let Some(old) = own.first().and_then(|place| known(&place)) else {
+    let Some(old) = subgroup_barriers.first().and_then(|place| known(&place)) else {
         return;
     };
     let new = words[BOUND];
     words[BOUND] += 1;
-    for place in own {
+    for place in subgroup_barriers {
         words[place] = new;
     }
     let more = [

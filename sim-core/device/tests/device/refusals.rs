@@ -5,14 +5,14 @@ use sim_device::{AdapterKind, BatchBuilder, Choice, Device, DeviceError, Replay,
 
 #[test]
 fn adapters_stand_hardware_first_and_are_found_by_place_and_name() {
-    let found = adapters();
-    assert!(!found.is_empty(), "the tests need an adapter");
-    assert!(found.is_sorted_by_key(|info| info.kind));
+    let adapters = adapters();
+    assert!(!adapters.is_empty(), "the tests need an adapter");
+    assert!(adapters.is_sorted_by_key(|info| info.kind));
     assert!(
         AdapterKind::Discrete < AdapterKind::Integrated
             && AdapterKind::Virtual < AdapterKind::Software
     );
-    for (place, info) in found.iter().enumerate() {
+    for (place, info) in adapters.iter().enumerate() {
         assert_eq!(info.index, place);
         assert!(info.binding_max >= 128 << 20 && info.workgroup_max >= 128);
         let device = Device::open(&Choice::Index(place), None).unwrap();
@@ -112,13 +112,13 @@ fn commands_that_cannot_be_are_refused_by_name() {
 
 #[test]
 fn things_of_another_device_are_refused() {
-    let (one, other) = (device(), device());
+    let (first, other) = (device(), device());
     let (add, a) = (
-        program(&one, scale_add(1.0, 1)),
-        one.buffer("a", 16).unwrap(),
+        program(&first, scale_add(1.0, 1)),
+        first.buffer("a", 16).unwrap(),
     );
     let b = other.buffer("b", 16).unwrap();
-    for device in [&one, &other] {
+    for device in [&first, &other] {
         let mut batch = device.batch(Replay::Recorded);
         batch.dispatch(&add, &[(0, &a, 0..16), (3, &b, 0..16)], 1);
         assert!(

@@ -75,11 +75,11 @@ fn what_a_sum_rounds_away_can_be_kept() {
     let mut batch = device.batch(Replay::Recorded);
     batch.dispatch(&program, &[(0, &memory, 0..20)], 1);
     device.run(&[&batch.finish().unwrap()]).unwrap();
-    let found = numbers(&memory);
-    assert_eq!(found[2], b - ((a + b) - a));
-    assert_eq!(found[2], b);
+    let results = numbers(&memory);
+    assert_eq!(results[2], b - ((a + b) - a));
+    assert_eq!(results[2], b);
     // a product is rounded before it is added to
-    assert_eq!(found[3], a * b - b);
+    assert_eq!(results[3], a * b - b);
 }
 
 #[test]

@@ -32,13 +32,13 @@ fn words(wgsl: &str) -> Vec<u32> {
 fn instructions(wgsl: &str) -> Vec<(u32, Vec<u32>)> {
     let words = words(wgsl);
     let mut rest = &words[5..];
-    let mut found = Vec::new();
+    let mut instructions = Vec::new();
     while let Some(head) = rest.first() {
-        let (this, others) = rest.split_at(*head as usize >> 16);
-        found.push((head & 0xffff, this[1..].to_vec()));
+        let (instruction, others) = rest.split_at(*head as usize >> 16);
+        instructions.push((head & 0xffff, instruction[1..].to_vec()));
         rest = others;
     }
-    found
+    instructions
 }
 
 /// Results that are decorated with `NoContraction`.
@@ -123,7 +123,7 @@ fn shuffles_of_a_subgroup_ask_for_their_capabilities() {
         );
     }
     for code in [346, 348] {
-        assert!(all.iter().any(|(found, _)| *found == code), "{code}");
+        assert!(all.iter().any(|(opcode, _)| *opcode == code), "{code}");
     }
     assert_eq!(words(SHUFFLE)[1], 0x1_0300, "SPIR-V 1.3");
 }
@@ -159,15 +159,15 @@ fn a_barrier_of_a_subgroup_orders_storage_buffers() {
     let semantics: Vec<u32> = barriers.map(|(_, operands)| operands[2]).collect();
     assert_eq!(semantics.len(), 2);
     for id in semantics {
-        let own: Vec<u32> = values
+        let constants: Vec<u32> = values
             .iter()
-            .filter(|one| one.0 == id)
-            .map(|one| one.1)
+            .filter(|constant| constant.0 == id)
+            .map(|constant| constant.1)
             .collect();
         // acquire and release, storage buffers, memory of the subgroup
-        assert_eq!(own, [0x8 | 0x40 | 0x80]);
+        assert_eq!(constants, [0x8 | 0x40 | 0x80]);
     }
     // the index is what it was
     assert!(values.iter().any(|(_, value)| *value == 136));
-    assert!(words(SOURCE)[3] > values.iter().map(|one| one.0).max().unwrap());
+    assert!(words(SOURCE)[3] > values.iter().map(|constant| constant.0).max().unwrap());
 }
