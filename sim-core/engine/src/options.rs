@@ -180,9 +180,9 @@ pub(crate) fn backends(
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))
         }
         Device::Auto { cache, software } => {
-            let found = adapters();
+            let adapters = adapters();
             let will_do = |info: &&AdapterInfo| *software || info.kind != AdapterKind::Software;
-            match found.iter().find(will_do) {
+            match adapters.iter().find(will_do) {
                 None => Some("the processor: no GPU was found".to_owned()),
                 Some(adapter) => {
                     let question = Question {

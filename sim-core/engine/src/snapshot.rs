@@ -273,8 +273,8 @@ pub(crate) fn first<'a>(
         return Err(SnapshotError::Worlds { got, expected });
     }
     let records = &bytes[HEAD..];
-    let own = records.chunks_exact(here.record()).take(expected);
-    let are_sound = own.map(|record| {
+    let world_records = records.chunks_exact(here.record()).take(expected);
+    let are_sound = world_records.map(|record| {
         is_finite(&record[COUNTERS..], here.precision)
             && length_of_none(record, here.real(), quaternions).is_none()
     });

@@ -282,10 +282,10 @@ fn mass_matrix_of_jacobians(case: &mut Case) -> Vec<f64> {
         let back = [-quat[0], -quat[1], -quat[2], quat[3]];
         for a in 0..n {
             let [x, y, z, rx, ry, rz] = column(a);
-            let own = turned(back, [rx, ry, rz]);
+            let local = turned(back, [rx, ry, rz]);
             let spin = turned(
                 quat,
-                std::array::from_fn(|i| dot(&inertial.inertia[i], &own)),
+                std::array::from_fn(|i| dot(&inertial.inertia[i], &local)),
             );
             let push = [x, y, z].map(|v| v * inertial.mass);
             let momentum = [push, spin].concat();

@@ -131,8 +131,8 @@ fn mass_matrix_in_f32_keeps_the_inertia_of_a_light_wrist() {
         let n = model.dofs();
         for seed in 0..16 {
             let q = state(&model, seed, 2.0);
-            let [found, exact] = both(&model, Field::MassMatrix, &q, &vec![0.0; n]);
-            for (k, (x, y)) in found.iter().zip(&exact).enumerate() {
+            let [single, exact] = both(&model, Field::MassMatrix, &q, &vec![0.0; n]);
+            for (k, (x, y)) in single.iter().zip(&exact).enumerate() {
                 let (i, j) = (k / n, k % n);
                 let share = (x - y).abs() / (exact[i * n + i] * exact[j * n + j]).sqrt();
                 assert!(share < 2e-6, "{floating} {seed} ({i}, {j}): {share:e}");
@@ -148,11 +148,11 @@ fn bias_force_in_f32_keeps_the_load_of_a_light_wrist() {
         let n = model.dofs();
         for seed in 0..16 {
             let (q, qd) = (state(&model, seed, 2.0), state(&model, seed + 50, 2.0));
-            let [found, exact] = both(&model, Field::BiasForce, &q, &qd[..n]);
+            let [single, exact] = both(&model, Field::BiasForce, &q, &qd[..n]);
             let [_, mass] = both(&model, Field::MassMatrix, &q, &qd[..n]);
             // of the last joint alone: what the others carry is heavy
             let last = n - 1;
-            let share = (found[last] - exact[last]).abs() / mass[n * n - 1].sqrt();
+            let share = (single[last] - exact[last]).abs() / mass[n * n - 1].sqrt();
             assert!(share < 2e-6, "{floating} {seed}: {share:e}");
         }
     }

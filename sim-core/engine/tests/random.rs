@@ -159,9 +159,9 @@ fn normal_numbers_are_normal_along_worlds_episodes_indices_and_seeds() {
 #[test]
 fn numbers_of_other_worlds_dofs_episodes_streams_and_seeds_are_uncorrelated() {
     type Number = fn(u32) -> Draw;
-    let (own, index): (Number, u32) = (|i| Draw::new(9, i, 4, Stream::StartPosition), 2);
+    let (drawn, index): (Number, u32) = (|i| Draw::new(9, i, 4, Stream::StartPosition), 2);
     let others: [(&str, Number, u32); 6] = [
-        ("the next dof", own, 3),
+        ("the next dof", drawn, 3),
         (
             "the next world",
             |i| Draw::new(9, i + 1, 4, Stream::StartPosition),
@@ -189,14 +189,14 @@ fn numbers_of_other_worlds_dofs_episodes_streams_and_seeds_are_uncorrelated() {
         ),
     ];
     let normal = |draw: Number, index| sample(|i| draw(i as u32).normal(index, 0.0, 1.0));
-    let own = normal(own, index);
+    let drawn = normal(drawn, index);
     for (name, other, index) in others {
         let other = normal(other, index);
         for (kind, shape) in [
             ("", (|x| x) as fn(f64) -> f64),
             ("the square of ", |x| (x * x - 1.0) / 2f64.sqrt()),
         ] {
-            let products: Vec<f64> = own
+            let products: Vec<f64> = drawn
                 .iter()
                 .zip(&other)
                 .map(|(a, b)| shape(*a) * shape(*b))

@@ -146,9 +146,9 @@ fn jacobian<C: Cx>(
         row += 1;
     }
     for tie in &m.ties {
-        for own in 0..tie.rows {
+        for tie_row in 0..tie.rows {
             let active = zero.lt(cx.get(&weight[row]));
-            for (entry, &dof) in ties[tie.jacobian(own)].iter().zip(&tie.dofs) {
+            for (entry, &dof) in ties[tie.jacobian(tie_row)].iter().zip(&tie.dofs) {
                 to[row * dofs + dof] = C::F::select(active, *entry, zero);
             }
             row += 1;

@@ -179,16 +179,16 @@ mod tests {
                 // one behind it does not matter
                 (singles[263], doubles[263]) = (f32::INFINITY, f64::NAN);
                 let part = first..first + 200;
-                let found = Some(first + bad);
+                let expected = Some(first + bad);
                 let of_singles = Values::F32(&singles);
                 assert_eq!(
                     of_singles.first_not_finite(part.clone(), Precision::F32),
-                    found
+                    expected
                 );
                 let of_doubles = Values::F64(&doubles);
                 assert_eq!(
                     of_doubles.first_not_finite(part.clone(), Precision::F32),
-                    found
+                    expected
                 );
                 assert_eq!(of_doubles.first_not_finite(part, Precision::F64), None);
             }

@@ -106,16 +106,16 @@ impl Noise {
         draw: &Draw,
         deviation: impl Fn(usize) -> f64,
     ) {
-        let of = |index: usize, number: usize| sample(draw, index, deviation(first + number));
+        let sampled = |index: usize, number: usize| sample(draw, index, deviation(first + number));
         match field {
             Field::JointQMeasured => {
                 for &(motion, dof, coord) in &self.joints {
-                    add_to_joint(motion, &mut row[coord..], |k| of(dof + k, dof + k));
+                    add_to_joint(motion, &mut row[coord..], |k| sampled(dof + k, dof + k));
                 }
             }
             Field::SiteQ => {
                 for (site, pose) in row.chunks_exact_mut(7).enumerate() {
-                    let noise = |k: usize| of(6 * site + k, 2 * site + k / 3);
+                    let noise = |k: usize| sampled(6 * site + k, 2 * site + k / 3);
                     (0..3).for_each(|k| add(&mut pose[k], noise(k)));
                     turn(&mut pose[3..], [noise(3), noise(4), noise(5)], false);
                 }
@@ -127,7 +127,7 @@ impl Noise {
                     _ => 3,
                 };
                 for (k, x) in row.iter_mut().enumerate() {
-                    add(x, of(k, k / shared));
+                    add(x, sampled(k, k / shared));
                 }
             }
         }

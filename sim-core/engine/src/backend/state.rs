@@ -67,8 +67,8 @@ impl Shape {
 }
 
 fn place(array: Array) -> usize {
-    let found = RECORD.iter().position(|known| *known == array);
-    found.unwrap_or_else(|| unreachable!("{array:?} is not of a record"))
+    let index = RECORD.iter().position(|known| *known == array);
+    index.unwrap_or_else(|| unreachable!("{array:?} is not of a record"))
 }
 
 /// Do these stages look for contacts, and count those that do not fit?

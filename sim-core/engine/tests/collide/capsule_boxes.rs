@@ -45,9 +45,9 @@ fn every_lane_has_the_points_of_a_world_alone() {
 fn single_precision_has_the_points_of_double_precision_but_for_1_percent() {
     let pairs = random_pairs(2000);
     let [double, single] = [DOUBLE, SINGLE].map(|m| contacts_of_geoms(m, &pairs, MARGIN));
-    let is_same = |(one, other): &(&Vec<Contact>, &Vec<Contact>)| {
-        let mut points = one.iter().zip(*other);
-        one.len() == other.len()
+    let is_same = |(first, other): &(&Vec<Contact>, &Vec<Contact>)| {
+        let mut points = first.iter().zip(*other);
+        first.len() == other.len()
             && points.all(|(a, b)| {
                 let off = [sub(a.point, b.point), sub(a.normal, b.normal)].map(|x| dot(x, x));
                 (a.distance - b.distance).abs() < 1e-5 && off[0] < 1e-8 && off[1] < 1e-6

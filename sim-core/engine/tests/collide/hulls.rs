@@ -113,7 +113,7 @@ fn cases(a: Kind, b: Kind, count: usize) -> (Vec<Hull>, Vec<Pair>) {
 
 fn check(a: Kind, b: Kind, count: usize) -> Found {
     let (hulls, pairs) = cases(a, b, count);
-    let mut found = Found::default();
+    let mut tally = Found::default();
     for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
         let a = Polytope::from_shape(pair.shapes[0], &pair.axes[0], [0.0; 3], &hulls);
         let b = Polytope::from_shape(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
@@ -131,11 +131,11 @@ fn check(a: Kind, b: Kind, count: usize) -> Found {
             .iter()
             .min_by(|x, y| x.distance.total_cmp(&y.distance))
         else {
-            found.missing += 1;
+            tally.missing += 1;
             continue;
         };
         let n = deepest.normal;
-        found.untrue = found
+        tally.untrue = tally
             .untrue
             .max((along(&a, &b, n) - deepest.distance).abs() / size);
         assert!(contacts.iter().all(|x| x.normal == n));
@@ -153,30 +153,30 @@ fn check(a: Kind, b: Kind, count: usize) -> Found {
             }
         };
         let way = sub(n, normal);
-        found.tilted += usize::from(dot(way, way).sqrt() > 1e-5 && truth > -0.1 * size);
+        tally.tilted += usize::from(dot(way, way).sqrt() > 1e-5 && truth > -0.1 * size);
         let errors = [
             (deepest.distance - truth).abs() / size,
             dot(way, way).sqrt(),
         ];
         if truth > 0.0 || apart {
-            found.separated += 1;
+            tally.separated += 1;
             for k in 0..2 {
-                found.apart[k] = found.apart[k].max(errors[k]);
+                tally.apart[k] = tally.apart[k].max(errors[k]);
             }
         } else if truth > -0.1 * size {
-            found.shallow += 1;
-            found.off += usize::from(errors[0] > 1e-5);
+            tally.shallow += 1;
+            tally.off += usize::from(errors[0] > 1e-5);
             for k in 0..2 {
-                found.touching[k] = found.touching[k].max(errors[k]);
+                tally.touching[k] = tally.touching[k].max(errors[k]);
             }
         } else {
-            found.deep += 1;
+            tally.deep += 1;
             let excess = along(&a, &b, n) / truth - 1.0;
-            found.worst = found.worst.max(excess);
-            found.worse += usize::from(excess > 0.01);
+            tally.worst = tally.worst.max(excess);
+            tally.worse += usize::from(excess > 0.01);
         }
     }
-    found
+    tally
 }
 
 impl Found {
@@ -249,14 +249,14 @@ fn the_lowest_vertex_of_a_hull_above_a_plane_is_found() {
     for pair in &mut pairs {
         pair.shapes[0] = Shape::Plane;
     }
-    for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
+    for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &hulls, &pairs, 1.0)) {
         let hull = Polytope::from_shape(pair.shapes[1], &pair.axes[1], pair.center, &hulls);
         let n = pair.axes[0][2];
         let truth = -hull.reach(scale(n, -1.0));
-        assert!(found.len() >= 3, "{found:?}");
-        let least = found.iter().map(|x| x.distance).fold(1.0, f64::min);
+        assert!(contacts.len() >= 3, "{contacts:?}");
+        let least = contacts.iter().map(|x| x.distance).fold(1.0, f64::min);
         assert!((least - truth).abs() < 1e-5 * 0.1);
-        for x in &found {
+        for x in &contacts {
             let off = sub(x.normal, n);
             assert!(dot(off, off).sqrt() < 1e-12, "{x:?} {n:?}");
             // half-way between the plane and a vertex

@@ -101,14 +101,14 @@ fn single_precision_differs_from_double_by_less_than_1e_4_of_the_size_but_for_1_
             let distances = contacts.iter().map(|x| x.distance);
             distances.fold(MARGIN, f64::min)
         };
-        let far = |(one, other): &(&Vec<Contact>, &Vec<Contact>)| {
-            (least(one) - least(other)).abs() / 0.1 > 1e-4
+        let far = |(first, other): &(&Vec<Contact>, &Vec<Contact>)| {
+            (least(first) - least(other)).abs() / 0.1 > 1e-4
         };
         let apart = single.iter().zip(&double).filter(far).count();
         // two local minima of depth may change places, and fewer rounds of a curved one end sooner
         assert!(apart <= 4, "{:?}: {apart}", pairs[0].shapes);
         let each = single.iter().zip(&double);
-        let worst = each.map(|(one, other)| (least(one) - least(other)).abs() / 0.1);
+        let worst = each.map(|(first, other)| (least(first) - least(other)).abs() / 0.1);
         let worst = worst.fold(0.0, f64::max);
         assert!(worst < 0.1, "{:?}: {worst}", pairs[0].shapes);
     }
@@ -128,18 +128,18 @@ fn contacts_are_the_same_whichever_of_two_shapes_stands_still() {
             let other = contacts_exchanged(&hulls, pair, MARGIN);
             let least = |a: &&Contact, b: &&Contact| a.distance.total_cmp(&b.distance);
             let nearest = [&contacts, &other].map(|contacts| contacts.iter().min_by(least));
-            let [Some(one), Some(other)] = nearest else {
+            let [Some(first), Some(other)] = nearest else {
                 assert_eq!(nearest, [None; 2], "{pair:?}");
                 continue;
             };
             // from the shape that stands still to the free one
-            let turned = size(add(one.normal, other.normal));
-            let apart = size(sub(one.point, other.point));
-            let off = (one.distance - other.distance).abs();
+            let turned = size(add(first.normal, other.normal));
+            let apart = size(sub(first.point, other.point));
+            let off = (first.distance - other.distance).abs();
             // a search on a curved surface ends where the normal is good to 1e-6; inside each other lines may cross anywhere
-            assert!(off < 1e-9 && turned < 1e-5, "{one:?} {other:?} {pair:?}");
-            let touching = one.distance < 0.0;
-            assert!(apart < 1e-5 || touching, "{one:?} {other:?} {pair:?}");
+            assert!(off < 1e-9 && turned < 1e-5, "{first:?} {other:?} {pair:?}");
+            let touching = first.distance < 0.0;
+            assert!(apart < 1e-5 || touching, "{first:?} {other:?} {pair:?}");
         }
     }
 }

@@ -69,8 +69,8 @@ impl Polytope {
                     .iter()
                     .map(|edge| {
                         let [from, to] = edge.ends.map(|end| polytope.points[end as usize]);
-                        let [one, other] = edge.faces.map(|face| polytope.faces[face as usize]);
-                        [unit(sub(to, from)), one, other]
+                        let [first, other] = edge.faces.map(|face| polytope.faces[face as usize]);
+                        [unit(sub(to, from)), first, other]
                     })
                     .collect();
             }
@@ -116,9 +116,9 @@ pub fn least_depth(a: &Polytope, b: &Polytope) -> (f64, Vector) {
     };
     a.faces.iter().for_each(|&n| offer(n));
     b.faces.iter().for_each(|&n| offer(scale(n, -1.0)));
-    for &[d, one, other] in &b.edges {
+    for &[d, normal, other] in &b.edges {
         for &q in &a.directions {
-            if dot(one, q) * dot(other, q) < 0.0 {
+            if dot(normal, q) * dot(other, q) < 0.0 {
                 let n = cross(d, q);
                 if dot(n, n) > 1e-12 {
                     let n = unit(n);
@@ -129,7 +129,7 @@ pub fn least_depth(a: &Polytope, b: &Polytope) -> (f64, Vector) {
         }
         for &[e, first, second] in &a.edges {
             // both arcs of normals, b's turned round, cross on the same side (Gregorius, GDC 2013)
-            let (c, f) = (scale(one, -1.0), scale(other, -1.0));
+            let (c, f) = (scale(normal, -1.0), scale(other, -1.0));
             let (arc_a, arc_b) = (cross(second, first), cross(f, c));
             let (cba, dba) = (dot(c, arc_a), dot(f, arc_a));
             let (adc, bdc) = (dot(first, arc_b), dot(second, arc_b));

@@ -45,15 +45,15 @@ pub fn oracle(pair: &Pair) -> (f64, Vector) {
     let segment = |h: f64| Segment::new(Place::new(0.0, 0.0, -h), Place::new(0.0, 0.0, h));
     let cuboid = |h: Vector| Cuboid::new(Place::new(h[0], h[1], h[2]));
     let between = a.inv_mul(&b);
-    let cores = |found: Option<parry3d_f64::query::Contact>, radius: f64| {
-        let found = found.expect("nothing is out of reach");
-        let normal = a.rotation * found.normal1;
-        (found.dist - radius, [normal.x, normal.y, normal.z])
+    let cores = |contact: Option<parry3d_f64::query::Contact>, radius: f64| {
+        let contact = contact.expect("nothing is out of reach");
+        let normal = a.rotation * contact.normal1;
+        (contact.dist - radius, [normal.x, normal.y, normal.z])
     };
-    let balls = |found: Option<parry3d_f64::query::Contact>| {
-        let found = found.expect("nothing is out of reach");
-        let normal = found.normal1;
-        (found.dist, [normal.x, normal.y, normal.z])
+    let balls = |contact: Option<parry3d_f64::query::Contact>| {
+        let contact = contact.expect("nothing is out of reach");
+        let normal = contact.normal1;
+        (contact.dist, [normal.x, normal.y, normal.z])
     };
     match pair.shapes {
         [Shape::Sphere(r), Shape::Sphere(s)] => {
@@ -67,8 +67,8 @@ pub fn oracle(pair: &Pair) -> (f64, Vector) {
             balls(contact(&a, &Ball::new(r), &b, &cuboid(half), 10.0).unwrap())
         }
         [Shape::Capsule(r, h), Shape::Capsule(s, k)] => {
-            let found = distance(&a, &segment(h), &b, &segment(k)).unwrap();
-            (found.distance - r - s, [0.0; 3])
+            let contact = distance(&a, &segment(h), &b, &segment(k)).unwrap();
+            (contact.distance - r - s, [0.0; 3])
         }
         [Shape::Capsule(r, h), Shape::Box(half)] => {
             let (segment, cuboid) = (segment(h), cuboid(half));
@@ -78,9 +78,9 @@ pub fn oracle(pair: &Pair) -> (f64, Vector) {
             )
         }
         [Shape::Box(half), Shape::Box(other)] => {
-            let (one, two) = (cuboid(half), cuboid(other));
+            let (first, second) = (cuboid(half), cuboid(other));
             cores(
-                contact_support_map_support_map(&between, &one, &two, 10.0),
+                contact_support_map_support_map(&between, &first, &second, 10.0),
                 0.0,
             )
         }

@@ -93,7 +93,7 @@ fn nearest_points_are_parrys() {
         let mut random = Random(number as u64);
         let pairs = random_pairs(&mut random, kinds, CONFIGURATIONS);
         let (mut classes, mut refuted) = ([0; 3], 0);
-        for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
+        for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
             let size = reach(pair.shapes[0]) + reach(pair.shapes[1]);
             let (distance, normal) = oracle(pair);
             // parry's expanding polytope stops early now and then: its direction then shows less than it says
@@ -101,36 +101,43 @@ fn nearest_points_are_parrys() {
                 refuted += 1;
                 continue;
             }
-            assert!(!found.is_empty(), "{distance} {pair:?}");
-            let ours = nearest(&found);
+            assert!(!contacts.is_empty(), "{distance} {pair:?}");
+            let nearest_contact = nearest(&contacts);
             // a direction cannot show more than there is; it must show all but the tolerance
-            let shown = separation(pair, ours.normal);
-            let length = dot(ours.normal, ours.normal).sqrt();
+            let shown = separation(pair, nearest_contact.normal);
+            let length = dot(nearest_contact.normal, nearest_contact.normal).sqrt();
             assert!((length - 1.0).abs() < 1e-9, "{length} {pair:?}");
             if distance > -0.1 * size {
                 classes[usize::from(distance < 0.0)] += 1;
-                let off = (ours.distance - distance)
+                let off = (nearest_contact.distance - distance)
                     .abs()
                     .max((shown - distance).abs());
                 assert!(
                     off < DISTANCE * size,
-                    "{ours:?} {shown} {distance} {pair:?}"
+                    "{nearest_contact:?} {shown} {distance} {pair:?}"
                 );
             } else {
                 classes[2] += 1;
                 let least = distance * 1.01;
-                assert!(shown > least, "{ours:?} {shown} {distance} {pair:?}");
+                assert!(
+                    shown > least,
+                    "{nearest_contact:?} {shown} {distance} {pair:?}"
+                );
                 // the deepest corner of a box may be beside the other's face, where the manifold is cut
                 assert!(
-                    ours.distance > shown - DISTANCE * size && ours.distance < shown * 0.99,
-                    "{ours:?} {shown} {pair:?}"
+                    nearest_contact.distance > shown - DISTANCE * size
+                        && nearest_contact.distance < shown * 0.99,
+                    "{nearest_contact:?} {shown} {pair:?}"
                 );
             }
             // parry's normals are good to its tolerance over the distance
             if distance > 0.01 * size && dot(normal, normal) > 0.5 {
-                let off = (0..3).map(|i| (ours.normal[i] - normal[i]).abs());
+                let off = (0..3).map(|i| (nearest_contact.normal[i] - normal[i]).abs());
                 let off = off.fold(0.0, f64::max);
-                assert!(off < 1e-5, "{ours:?} {normal:?} {distance} {pair:?}");
+                assert!(
+                    off < 1e-5,
+                    "{nearest_contact:?} {normal:?} {distance} {pair:?}"
+                );
             }
         }
         println!("pair {number}: apart, shallow, deep: {classes:?}, refuted {refuted}");
@@ -144,10 +151,10 @@ fn boxes_that_overlap_are_pushed_out_a_twentieth_beyond_the_short_way_at_most() 
     let mut random = Random(6);
     let pairs = random_pairs(&mut random, [cuboid, cuboid], CONFIGURATIONS);
     let mut overlapping = 0;
-    for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
+    for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
         let size = reach(pair.shapes[0]) + reach(pair.shapes[1]);
         let (distance, _) = oracle(pair);
-        for point in &found {
+        for point in &contacts {
             let shown = separation(pair, point.normal);
             assert!(
                 point.distance > shown - DISTANCE * size,
@@ -160,8 +167,8 @@ fn boxes_that_overlap_are_pushed_out_a_twentieth_beyond_the_short_way_at_most() 
         }
         overlapping += 1;
         // a face is kept where an edge is a twentieth better; parry's depth is good to a hundredth where it is deep
-        let shown = separation(pair, nearest(&found).normal);
-        assert!(shown > distance * 1.07, "{found:?} {distance} {pair:?}");
+        let shown = separation(pair, nearest(&contacts).normal);
+        assert!(shown > distance * 1.07, "{contacts:?} {distance} {pair:?}");
     }
     assert!(overlapping > 1000, "{overlapping}");
 }
@@ -171,21 +178,24 @@ fn nearest_points_on_a_plane_are_the_supports() {
     for (number, kinds) in ON_PLANE.into_iter().enumerate() {
         let mut random = Random(number as u64);
         let pairs = random_pairs(&mut random, kinds, CONFIGURATIONS);
-        for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
+        for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
             let normal = pair.axes[0][2];
             let local = pair.axes[1].map(|axis| dot(axis, normal));
             let distance = dot(normal, pair.center) - support(pair.shapes[1], local);
-            let ours = nearest(&found);
-            let off = sub(ours.normal, normal);
-            assert!(dot(off, off).sqrt() < 1e-12, "{ours:?} {normal:?}");
+            let nearest_contact = nearest(&contacts);
+            let off = sub(nearest_contact.normal, normal);
             assert!(
-                (ours.distance - distance).abs() < 1e-12,
-                "{ours:?} {distance} {pair:?}"
+                dot(off, off).sqrt() < 1e-12,
+                "{nearest_contact:?} {normal:?}"
             );
-            let height = dot(normal, ours.point) - 0.5 * distance;
+            assert!(
+                (nearest_contact.distance - distance).abs() < 1e-12,
+                "{nearest_contact:?} {distance} {pair:?}"
+            );
+            let height = dot(normal, nearest_contact.point) - 0.5 * distance;
             assert!(
                 height.abs() < 1e-12,
-                "the point is half-way: {ours:?} {pair:?}"
+                "the point is half-way: {nearest_contact:?} {pair:?}"
             );
         }
     }
@@ -197,8 +207,8 @@ fn points_are_between_the_surfaces() {
     for kinds in ROUND {
         let mut random = Random(11);
         let pairs = random_pairs(&mut random, kinds, 1000);
-        for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
-            for point in found {
+        for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, FAR)) {
+            for point in contacts {
                 let a: Vector = std::array::from_fn(|i| {
                     point.point[i] - 0.5 * point.distance * point.normal[i]
                 });
@@ -248,9 +258,9 @@ fn equal_stacked_cubes_have_four_points_at_their_corners() {
             });
         }
     }
-    for (pair, found) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, 1e-3)) {
-        assert_eq!(found.len(), 4, "{pair:?}");
-        for point in &found {
+    for (pair, contacts) in pairs.iter().zip(contacts(DOUBLE, &[], &pairs, 1e-3)) {
+        assert_eq!(contacts.len(), 4, "{pair:?}");
+        for point in &contacts {
             let at = pair.axes[0].map(|axis| dot(axis, point.point));
             let corner = [at[0].abs(), at[1].abs(), at[2]];
             let off = (corner[0] - 0.05)
@@ -260,8 +270,8 @@ fn equal_stacked_cubes_have_four_points_at_their_corners() {
             assert!((point.distance + 1e-4).abs() < 1e-12, "{point:?}");
         }
     }
-    for found in contacts(SINGLE, &[], &pairs, 1e-3) {
-        assert_eq!(found.len(), 4);
+    for contacts in contacts(SINGLE, &[], &pairs, 1e-3) {
+        assert_eq!(contacts.len(), 4);
     }
 }
 
@@ -281,9 +291,9 @@ fn shapes_at_rest_have_the_points_that_hold_them() {
         (Shape::Plane, brick, UPRIGHT, 0.04, 4),
         (slab, brick, UPRIGHT, 0.09, 4),
     ] {
-        let found = at_rest(a, b, axes, [0.01, 0.02, height - 1e-4]);
-        assert_eq!(found.len(), count, "{a:?} {b:?} {found:?}");
-        for point in found {
+        let contacts = at_rest(a, b, axes, [0.01, 0.02, height - 1e-4]);
+        assert_eq!(contacts.len(), count, "{a:?} {b:?} {contacts:?}");
+        for point in contacts {
             assert!((point.distance + 1e-4).abs() < 1e-12, "{point:?}");
             assert!((point.normal[2] - 1.0).abs() < 1e-12, "{point:?}");
         }
@@ -300,9 +310,9 @@ fn shapes_at_rest_have_the_points_that_hold_them() {
         center: [0.05, 0.05 - 1e-4, 0.0],
     };
     for (pair, ends) in [(flat, [-0.1, 0.1]), (beside, [-0.1, 0.1])] {
-        let found = contacts(DOUBLE, &[], &[pair], 1e-3).remove(0);
-        assert_eq!(found.len(), 2, "{pair:?} {found:?}");
-        for (point, end) in found.iter().zip(ends) {
+        let contacts = contacts(DOUBLE, &[], &[pair], 1e-3).remove(0);
+        assert_eq!(contacts.len(), 2, "{pair:?} {contacts:?}");
+        for (point, end) in contacts.iter().zip(ends) {
             assert!((point.point[0] - end).abs() < 1e-12, "{point:?}");
             assert!((point.distance + 1e-4).abs() < 1e-12, "{point:?}");
         }
@@ -326,13 +336,13 @@ fn shapes_inside_each_other_are_pushed_out_the_short_way() {
         (cuboid, cuboid, UPRIGHT, [0.0; 3], -0.2),
         (cuboid, cuboid, UPRIGHT, [0.15, 0.0, 0.0], -0.05),
     ] {
-        let found = at_rest(a, b, axes, center);
-        let ours = nearest(&found);
+        let contacts = at_rest(a, b, axes, center);
+        let nearest_contact = nearest(&contacts);
         assert!(
-            (ours.distance - distance).abs() < 1e-12,
-            "{a:?} {b:?} {found:?}"
+            (nearest_contact.distance - distance).abs() < 1e-12,
+            "{a:?} {b:?} {contacts:?}"
         );
-        for point in found {
+        for point in contacts {
             let numbers = point.point.into_iter().chain(point.normal);
             assert!(numbers.into_iter().all(f64::is_finite), "{point:?}");
             assert!(

@@ -70,13 +70,16 @@ fn a_hull_on_its_face_has_three_or_four_points_around_its_centre() {
                 (Shape::Cylinder(0.2, 0.1), 0.1),
                 (Shape::Hull(3), half),
             ] {
-                let found = points(&hulls, [a, shape], axes, [0.0, 0.0, top + high]);
+                let contacts = points(&hulls, [a, shape], axes, [0.0, 0.0, top + high]);
                 let least = if a == Shape::Hull(3) { 3 } else { expected };
                 assert!(
-                    found.len() >= least && found.len() <= 4,
-                    "{a:?} {hull}: {found:?}"
+                    contacts.len() >= least && contacts.len() <= 4,
+                    "{a:?} {hull}: {contacts:?}"
                 );
-                assert!(hold(&found, [0.0; 2], 0.01), "{a:?} {hull}: {found:?}");
+                assert!(
+                    hold(&contacts, [0.0; 2], 0.01),
+                    "{a:?} {hull}: {contacts:?}"
+                );
             }
         }
     }
@@ -88,36 +91,36 @@ fn a_cylinder_stands_on_four_points_and_lies_on_two() {
     let (radius, half) = (0.03, 0.05);
     let cylinder = Shape::Cylinder(radius, half);
     for base in [Shape::Box([0.2, 0.2, 0.1]), Shape::Cylinder(0.2, 0.1)] {
-        let found = points(
+        let standing = points(
             &hulls,
             [base, cylinder],
             turned(0.7, 0.0),
             [0.05, 0.0, 0.1 + half - 1e-4],
         );
-        assert_eq!(found.len(), 4);
-        assert!(hold(&found, [0.05, 0.0], 0.6 * radius), "{found:?}");
+        assert_eq!(standing.len(), 4);
+        assert!(hold(&standing, [0.05, 0.0], 0.6 * radius), "{standing:?}");
         let lying = turned(0.7, std::f64::consts::FRAC_PI_2);
-        let found = points(
+        let resting = points(
             &hulls,
             [base, cylinder],
             lying,
             [0.05, 0.0, 0.1 + radius - 1e-4],
         );
-        assert_eq!(found.len(), 2);
-        let way = sub(found[0].point, found[1].point);
+        assert_eq!(resting.len(), 2);
+        let way = sub(resting[0].point, resting[1].point);
         assert!(
             (dot(way, way).sqrt() - 2.0 * half).abs() < 1e-6,
-            "{found:?}"
+            "{resting:?}"
         );
     }
     // a hull on a standing and on a lying cylinder
-    let found = points(
+    let contacts = points(
         &hulls,
         [cylinder, Shape::Hull(0)],
         turned(0.7, 0.0),
         [0.0, 0.0, half + 0.1 - 1e-4],
     );
-    assert_eq!(found.len(), 4);
+    assert_eq!(contacts.len(), 4);
 }
 
 #[test]
@@ -131,15 +134,15 @@ fn a_capsule_lies_on_two_points() {
     };
     for (b, high) in [(Shape::Hull(0), 0.1), (Shape::Cylinder(0.2, 0.1), 0.1)] {
         let pair = pair(b, high + radius - 1e-4);
-        let found = contacts(DOUBLE, &hulls, &[pair], 0.0).remove(0);
-        assert_eq!(found.len(), 2, "{found:?}");
-        for contact in &found {
+        let contacts = contacts(DOUBLE, &hulls, &[pair], 0.0).remove(0);
+        assert_eq!(contacts.len(), 2, "{contacts:?}");
+        for contact in &contacts {
             assert!((contact.distance + 1e-4).abs() < 1e-9 && contact.normal[2] > 0.999_999);
         }
-        let way = sub(found[0].point, found[1].point);
+        let way = sub(contacts[0].point, contacts[1].point);
         assert!(
             (dot(way, way).sqrt() - 2.0 * half).abs() < 1e-6,
-            "{found:?}"
+            "{contacts:?}"
         );
     }
 }

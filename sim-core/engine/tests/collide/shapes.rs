@@ -288,7 +288,7 @@ fn touching(
     let (distances, normals) = (read(Field::ContactDistance), read(Field::ContactNormal));
     let room = distances.len() / places.len();
     let three = |x: &[f64], row: usize| [x[3 * row], x[3 * row + 1], x[3 * row + 2]];
-    let found = counts.iter().enumerate().map(|(world, &count)| {
+    let contacts = counts.iter().enumerate().map(|(world, &count)| {
         (0..count as usize)
             .map(|row| world * room + row)
             .map(|row| Contact {
@@ -298,7 +298,7 @@ fn touching(
             })
             .collect()
     });
-    let found: Vec<Vec<Contact>> = found.collect();
+    let contacts: Vec<Vec<Contact>> = contacts.collect();
     // the model has room for all that the shapes may have
     sim.step(&mut arena);
     let left_out = numbers(&sim, &arena, Field::ContactsLeftOut);
@@ -306,7 +306,7 @@ fn touching(
         left_out.iter().all(|&count| count == 0.0),
         "{still:?} {free:?}"
     );
-    found
+    contacts
 }
 
 /// All numbers of a field, world by world.

@@ -68,9 +68,9 @@ impl<F: Lane> Job<F> {
         let evaluate_now = places(&evaluation_stages(&constants, now));
         let evaluate_last = lags.then(|| {
             // what a step runs as well has run already
-            let own = evaluation.iter().copied();
-            let own = own.filter(|stage| stage.row().runs == Runs::Evaluation);
-            places(&own.collect::<Vec<_>>())
+            let stages = evaluation.iter().copied();
+            let stages = stages.filter(|stage| stage.row().runs == Runs::Evaluation);
+            places(&stages.collect::<Vec<_>>())
         });
         Job {
             shape: Shape::from_constants(&constants),

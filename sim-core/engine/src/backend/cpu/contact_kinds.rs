@@ -93,11 +93,11 @@ impl ContactKinds {
         self.scores.retain(|(score, _)| *score > 0.0);
         // a stable sort would allocate
         self.scores
-            .sort_unstable_by(|(one, k), (other, l)| other.total_cmp(one).then(k.cmp(l)));
+            .sort_unstable_by(|(score, k), (other, l)| other.total_cmp(score).then(k.cmp(l)));
         self.bits.clear();
         let ranked = self.scores.iter().map(|(_, k)| Bit::from_place(*k));
-        let own = (0..OWN).map(|place| 1 << (SHARED + OWN - 1 - place));
-        self.bits.extend(ranked.clone().zip(own));
+        let unshared = (0..OWN).map(|place| 1 << (SHARED + OWN - 1 - place));
+        self.bits.extend(ranked.clone().zip(unshared));
         let others = ranked.skip(OWN).filter(|bit| bit.level == 0);
         let shared = (0..SHARED).cycle().map(|place| 1 << place);
         self.bits.extend(others.zip(shared));
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(bits.len(), 12);
         let shared: Vec<Kind> = bits[OWN..].iter().map(|(_, bit)| *bit).collect();
         assert_eq!(shared, [1, 2, 4]);
-        let own: Kind = bits[..OWN].iter().map(|(_, bit)| bit).sum();
-        assert_eq!(usize::from(own), KINDS - 8);
+        let unshared: Kind = bits[..OWN].iter().map(|(_, bit)| bit).sum();
+        assert_eq!(usize::from(unshared), KINDS - 8);
     }
 }

@@ -46,11 +46,11 @@ impl<F: Lane> Chunk<F> {
         let mut frozen = false;
         for (lane, place) in self.lanes_of(block).enumerate() {
             let world = self.assignment.world(place);
-            let found = self.lanes[lane].to_usize() as u32;
+            let fault_bits = self.lanes[lane].to_usize() as u32;
             let fault = if self.is_frozen(world) {
                 self.status[world]
             } else {
-                found
+                fault_bits
             };
             if fault & status::FROZEN != 0 {
                 if !self.is_frozen(world) {

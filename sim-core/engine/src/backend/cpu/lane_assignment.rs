@@ -85,16 +85,16 @@ impl LaneAssignment {
         for kind in 0..KINDS {
             while next[kind] < ends[kind] {
                 let lane = next[kind];
-                let own = usize::from(self.kinds[self.world[lane]]);
-                if own == kind {
+                let kind_here = usize::from(self.kinds[self.world[lane]]);
+                if kind_here == kind {
                     next[kind] += 1;
                     continue;
                 }
                 // there is one, since each kind has as many lanes as worlds
-                while usize::from(self.kinds[self.world[next[own]]]) == own {
-                    next[own] += 1;
+                while usize::from(self.kinds[self.world[next[kind_here]]]) == kind_here {
+                    next[kind_here] += 1;
                 }
-                let other = next[own];
+                let other = next[kind_here];
                 self.world.swap(lane, other);
                 self.lane[self.world[lane]] = lane;
                 self.lane[self.world[other]] = other;

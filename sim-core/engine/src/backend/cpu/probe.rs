@@ -114,10 +114,10 @@ impl<'a, F: Lane> Watch<'a, F> {
             .add(of_block.lane(0).to_usize());
         let rows = moment.constants.rows();
         for lane in 0..moment.lanes {
-            let of = |x: F| x.lane(lane).to_usize();
-            self.profile.iterations.add(of(iterations));
-            self.profile.searches.add(of(searches));
-            self.profile.evaluations.add(of(evaluations));
+            let count = |x: F| x.lane(lane).to_usize();
+            self.profile.iterations.add(count(iterations));
+            self.profile.searches.add(count(searches));
+            self.profile.evaluations.add(count(evaluations));
             let weights = moment.block.efc_weight[..rows].iter();
             let acting = weights.filter(|weight| weight.lane(lane).to_f64() > 0.0);
             let (contacts, contact_rows) = contacts_of(moment, lane);

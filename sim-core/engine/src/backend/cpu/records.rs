@@ -22,8 +22,8 @@ impl<F: Lane> Chunk<F> {
     pub fn save(&self, job: &Job<F>, records: &mut [u8]) {
         let shape = job.shape;
         let records = records.chunks_exact_mut(job.record());
-        let own = records.skip(self.worlds.start).take(self.worlds.len());
-        for (world, record) in own.enumerate() {
+        let chunk_records = records.skip(self.worlds.start).take(self.worlds.len());
+        for (world, record) in chunk_records.enumerate() {
             let (counters, numbers) = record.split_at_mut(COUNTERS);
             counters[..8].copy_from_slice(&self.steps[world].to_le_bytes());
             counters[8..12].copy_from_slice(&self.status[world].to_le_bytes());

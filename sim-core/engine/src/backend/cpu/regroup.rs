@@ -49,10 +49,10 @@ impl<F: Lane> Chunk<F> {
         let numbers = job.shape.total();
         let place = |lane: usize| (lane / F::WIDTH) * numbers * F::WIDTH + lane % F::WIDTH;
         let state = &mut self.state;
-        self.assignment.group(|one, other| {
-            let (one, other) = (place(one), place(other));
+        self.assignment.group(|lane, other| {
+            let (first, other) = (place(lane), place(other));
             for k in 0..numbers {
-                state.swap(one + k * F::WIDTH, other + k * F::WIDTH);
+                state.swap(first + k * F::WIDTH, other + k * F::WIDTH);
             }
         });
     }

@@ -72,8 +72,8 @@ impl Gpu {
     /// The frame of a lost device: every world reports that it is not finite.
     pub(super) fn show_lost(&self, arena: &mut [u64]) {
         let worlds = self.mirror.seeds.len();
-        let found: &mut [u32] = words::array(arena, self.offset(Field::Status), 4 * worlds);
-        found.fill(status::NOT_FINITE);
+        let shown_status: &mut [u32] = words::array(arena, self.offset(Field::Status), 4 * worlds);
+        shown_status.fill(status::NOT_FINITE);
     }
 
     fn offset(&self, field: Field) -> usize {
@@ -101,11 +101,11 @@ impl Gpu {
         self.mirror
             .steps
             .copy_from_slice(words::array::<u64>(arena, at_step, 8 * worlds));
-        let found: &mut [u32] = words::array(arena, at_status, 4 * worlds);
-        if *found == self.mirror.status[..] {
+        let shown_status: &mut [u32] = words::array(arena, at_status, 4 * worlds);
+        if *shown_status == self.mirror.status[..] {
             return;
         }
-        for (world, &now) in found.iter().enumerate() {
+        for (world, &now) in shown_status.iter().enumerate() {
             let before = self.mirror.status[world];
             if counts && now & status::FROZEN != 0 && before & status::FROZEN == 0 {
                 self.mirror.frozen.count(FirstFrozen {

@@ -74,7 +74,9 @@ impl Imported {
         // SAFETY: batches write the arena alone, and run only while `Backend::run` borrows it.
         let pages = unsafe { device.import(owner, first_inside..end_inside)? };
         let before = (place - first) as u64;
-        let drawn = drawn.map_or(Drawn::InPlace, |own| Drawn::Apart(own, 0..own.bytes()));
+        let drawn = drawn.map_or(Drawn::InPlace, |buffer| {
+            Drawn::Apart(buffer, 0..buffer.bytes())
+        });
         let target = Target(&pages, before);
         let shown = record((device, compiled, tiles), drawn, target, bytes as u64)?;
         Ok(Imported {

@@ -41,8 +41,8 @@ impl HostMirror {
 
     /// Gives every world the same parameters.
     pub fn fill_params(&mut self, params: &[f32]) {
-        for own in self.params.chunks_exact_mut(self.varying.max(1)) {
-            own.copy_from_slice(params);
+        for world_params in self.params.chunks_exact_mut(self.varying.max(1)) {
+            world_params.copy_from_slice(params);
         }
     }
 
@@ -59,8 +59,8 @@ impl HostMirror {
     /// Sets columns of the parameters of all worlds, `(worlds, columns)`.
     pub fn set_params(&mut self, columns: &Range<usize>, values: &[f32]) {
         let rows = values.chunks_exact(columns.len().max(1));
-        for (own, row) in self.params.chunks_exact_mut(self.varying.max(1)).zip(rows) {
-            own[columns.clone()].copy_from_slice(row);
+        for (world_params, row) in self.params.chunks_exact_mut(self.varying.max(1)).zip(rows) {
+            world_params[columns.clone()].copy_from_slice(row);
         }
     }
 }

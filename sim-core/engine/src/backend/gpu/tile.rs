@@ -174,8 +174,8 @@ impl Tile {
                 (Part::Kernel(k), Some((iteration, active))) => {
                     buffers.truncate(4);
                     buffers.extend(active.bindings(iteration));
-                    let (found, at) = active.groups(iteration);
-                    batch.dispatch_found(&program.kernels[*k].program, &buffers, found, at);
+                    let (groups, at) = active.groups(iteration);
+                    batch.dispatch_found(&program.kernels[*k].program, &buffers, groups, at);
                 }
                 (
                     Part::Repeat {
@@ -294,8 +294,8 @@ impl Tile {
 
     /// Takes a command of all worlds, to be sent with the next frame; false if these columns are no whole command.
     pub fn stage(&mut self, input: Input, columns: &Range<usize>, values: &[f32]) -> bool {
-        let found = self.commands.iter_mut().find(|c| c.is(input, columns));
-        let Some(command) = found else { return false };
+        let staged = self.commands.iter_mut().find(|c| c.is(input, columns));
+        let Some(command) = staged else { return false };
         command.stage(values, &self.worlds);
         true
     }

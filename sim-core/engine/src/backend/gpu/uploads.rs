@@ -50,28 +50,28 @@ pub(super) fn has_own_memory(device: &Device) -> bool {
 struct Upload {
     staged: Staging,
     /// Where programs read them, on a card with its own memory.
-    own: Option<Buffer>,
+    on_device: Option<Buffer>,
 }
 
 impl Upload {
     fn new(device: &Device, label: &str, bytes: u64) -> Result<Upload, DeviceError> {
-        let own = has_own_memory(device).then(|| device.buffer(label, bytes));
+        let on_device = has_own_memory(device).then(|| device.buffer(label, bytes));
         Ok(Upload {
             staged: device.staging(label, bytes)?,
-            own: own.transpose()?,
+            on_device: on_device.transpose()?,
         })
     }
 
     /// Records what brings the first bytes to where programs read them.
     fn send(&self, batch: &mut BatchBuilder, bytes: u64) {
-        if let Some(own) = &self.own {
-            batch.copy(&self.staged, 0, own, 0, bytes.min(own.bytes()));
+        if let Some(buffer) = &self.on_device {
+            batch.copy(&self.staged, 0, buffer, 0, bytes.min(buffer.bytes()));
         }
     }
 
     /// What programs read.
     fn buffer(&self) -> &Buffer {
-        self.own.as_ref().unwrap_or(&self.staged)
+        self.on_device.as_ref().unwrap_or(&self.staged)
     }
 }
 
@@ -200,8 +200,8 @@ impl StagedCommand {
 
     /// Takes the command's values, `(worlds, columns)`.
     pub fn stage(&mut self, values: &[f32], worlds: &Range<usize>) {
-        let own = worlds.start * self.columns..worlds.end * self.columns;
-        let bytes: &[u8] = bytemuck::cast_slice(&values[own]);
+        let range = worlds.start * self.columns..worlds.end * self.columns;
+        let bytes: &[u8] = bytemuck::cast_slice(&values[range]);
         self.rows.staged.write()[..bytes.len()].copy_from_slice(bytes);
         self.is_waiting = !bytes.is_empty();
     }

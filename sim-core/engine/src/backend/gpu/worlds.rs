@@ -44,10 +44,10 @@ impl Gpu {
                 .draw(seed, number, episode, |field, column, value| {
                     record[shape.start(array_of(field)) + column] = value as f32;
                 });
-            let own = self.mirror.params_mut(world);
+            let world_params = self.mirror.params_mut(world);
             self.draw.draw_params(seed, number, episode, |k, value| {
                 record[params + k] = value as f32;
-                own[k] = value as f32;
+                world_params[k] = value as f32;
             });
             records.push(record);
         }

@@ -40,12 +40,12 @@ fn parts(classes: &[Class<f64>]) -> Vec<Vec<usize>> {
         by_trees.entry(class.trees).or_default().push(k);
     }
     let mut parts = Vec::new();
-    for own in by_trees.into_values() {
-        let widest = own.iter().map(|&k| classes[k].columns.len()).max();
-        let wide = columns(classes, &own).len();
+    for group in by_trees.into_values() {
+        let widest = group.iter().map(|&k| classes[k].columns.len()).max();
+        let wide = columns(classes, &group).len();
         match wide <= COLUMNS_MAX && wide <= WIDER_MAX * widest.unwrap_or(0) {
-            true => parts.push(own),
-            false => parts.extend(own.into_iter().map(|k| vec![k])),
+            true => parts.push(group),
+            false => parts.extend(group.into_iter().map(|k| vec![k])),
         }
     }
     parts
@@ -64,8 +64,8 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
     let mut t = m.contacts.clone();
     let columns: Vec<_> = parts.iter().map(|part| columns(&t.classes, part)).collect();
     let new_class = |class: usize| {
-        let found = parts.iter().position(|part| part.contains(&class));
-        found.expect("every class is part of one")
+        let index = parts.iter().position(|part| part.contains(&class));
+        index.expect("every class is part of one")
     };
     // the scalars of pairs, with the levers of the new columns
     let old = t.handles.pair_numbers;
@@ -155,8 +155,8 @@ fn class(
 ) -> Class<f64> {
     let old: Vec<&Class<f64>> = part.iter().map(|&k| &t.classes[k]).collect();
     let place = |dof: usize| {
-        let found = columns.iter().position(|column| column.0 == dof);
-        found.expect("a dof of the class")
+        let index = columns.iter().position(|column| column.0 == dof);
+        index.expect("a dof of the class")
     };
     let mut entries = vec![BTreeSet::new(); columns.len()];
     for class in &old {

@@ -74,16 +74,16 @@ impl Places {
 
     /// The numbers of an array.
     pub fn range(&self, array: Array) -> Range<u32> {
-        let found = self.arrays.iter().find(|(known, _)| *known == array);
-        found
+        let entry = self.arrays.iter().find(|(known, _)| *known == array);
+        entry
             .map(|(_, place)| place.clone())
             .expect("an array of the table")
     }
 
     /// The first number of a field that is computed for output.
     pub fn computed(&self, field: Field) -> u32 {
-        let found = self.computed.iter().find(|(known, _)| *known == field);
-        found.map(|(_, place)| *place).expect("a computed field")
+        let entry = self.computed.iter().find(|(known, _)| *known == field);
+        entry.map(|(_, place)| *place).expect("a computed field")
     }
 
     /// Where each number of a world's record lies, in the order of [`Shape`].

@@ -48,7 +48,7 @@ pub(in crate::backend::gpu) struct SharedCommands {
     all: Vec<OnDevice>,
     clear: Batch,
     read: Batch,
-    found: Staging,
+    flag_read: Staging,
     /// Those that go with the next frame.
     waiting: Vec<usize>,
 }
@@ -76,13 +76,13 @@ impl SharedCommands {
             constant(device, "no flag", &[0; 4])?,
             device.buffer("flag", 16)?,
         );
-        let found = device.staging("flag", 16)?;
+        let flag_read = device.staging("flag", 16)?;
         let (mut clear, mut read) = (
             device.batch(Replay::Recorded),
             device.batch(Replay::Recorded),
         );
         clear.copy(&none, 0, &flag, 0, 16);
-        read.copy(&flag, 0, &found, 0, 16);
+        read.copy(&flag, 0, &flag_read, 0, 16);
         let worlds = tiles.last().map_or(0, |tile| tile.worlds.end);
         let all = places.iter().map(|place| -> Result<_, BackendError> {
             let write = tiles.iter().map(|tile| {
@@ -98,7 +98,7 @@ impl SharedCommands {
             all: all.collect::<Result<_, _>>()?,
             clear: clear.finish()?,
             read: read.finish()?,
-            found,
+            flag_read,
             waiting: Vec::new(),
         })
     }
@@ -119,7 +119,7 @@ impl SharedCommands {
         batches.extend(commands.iter().map(|&command| &self.all[command].check));
         batches.push(&self.read);
         device.run_between(&batches, after, None)?;
-        Ok(self.found.read()[..4] == [0; 4])
+        Ok(self.flag_read.read()[..4] == [0; 4])
     }
 
     /// Takes these commands with the next frame, instead of what the host has staged.

@@ -75,8 +75,8 @@ impl Shared {
         let made = device.shared_buffer("frames and commands of a client", end)?;
         let pair = || -> Result<_, DeviceError> { Ok([device.timeline()?, device.timeline()?]) };
         let (timelines, exported) = match pair() {
-            Ok([(frames, theirs), (commands, ready)]) => {
-                (Some([frames, commands]), Ok([theirs, ready]))
+            Ok([(frames, frames_exported), (commands, ready)]) => {
+                (Some([frames, commands]), Ok([frames_exported, ready]))
             }
             Err(DeviceError::Export { reason }) => (None, Err(reason)),
             Err(error) => return Err(error.into()),

@@ -89,7 +89,7 @@ pub(in crate::backend::gpu) struct Loop {
 pub(in crate::backend::gpu) fn loops<'a>(
     orders: impl IntoIterator<Item = &'a Vec<Part>>,
 ) -> Vec<Loop> {
-    let mut found: Vec<Loop> = Vec::new();
+    let mut distinct: Vec<Loop> = Vec::new();
     for part in orders.into_iter().flatten() {
         let Part::Repeat {
             iterations,
@@ -102,15 +102,15 @@ pub(in crate::backend::gpu) fn loops<'a>(
         match exited {
             Some(exited) if *iterations > 1 => {
                 let (exited, iterations) = (*exited, *iterations);
-                match found.iter_mut().find(|known| known.exited == exited) {
+                match distinct.iter_mut().find(|known| known.exited == exited) {
                     Some(known) => known.iterations = known.iterations.max(iterations),
-                    None => found.push(Loop { exited, iterations }),
+                    None => distinct.push(Loop { exited, iterations }),
                 }
             }
-            _ => found.extend(loops([parts])),
+            _ => distinct.extend(loops([parts])),
         }
     }
-    found
+    distinct
 }
 
 /// Bytes from one header to the next: a program binds one header alone.
@@ -120,7 +120,7 @@ fn stride(device: &Device) -> u64 {
 
 /// Headers per list: half the iterations of the longest loop.
 fn headers(loops: &[Loop]) -> u64 {
-    let iterations = loops.iter().map(|one| one.iterations as u64);
+    let iterations = loops.iter().map(|entry| entry.iterations as u64);
     iterations.max().unwrap_or(0).div_ceil(2)
 }
 
@@ -143,9 +143,9 @@ pub(in crate::backend::gpu) fn sources(device: &Device, loops: &[Loop], width: u
         ("workgroup", u64::from(CLEAR_THREADS)),
     ];
     let mut sources = vec![source("clear lists", CLEAR.to_owned(), &constants)];
-    for one in loops {
+    for entry in loops {
         let constants = [
-            ("out", u64::from(one.exited)),
+            ("out", u64::from(entry.exited)),
             ("workgroup", u64::from(workgroups::physics(device.info()))),
         ];
         sources.push(source("list", FIRST.to_owned() + APPEND, &constants));
@@ -170,7 +170,7 @@ impl Compaction {
         let headers = headers(&loops);
         let programs = (!loops.is_empty()).then(|| {
             let clear = next();
-            let programs = loops.into_iter().map(|one| (one, [next(), next()]));
+            let programs = loops.into_iter().map(|entry| (entry, [next(), next()]));
             (clear, programs.collect())
         });
         Compaction { programs, headers }
@@ -183,8 +183,8 @@ impl Compaction {
 
     fn list_programs(&self, exited: u32) -> &[Program; 2] {
         let mut loops = self.programs.iter().flat_map(|(_, loops)| loops);
-        let found = loops.find(|(one, _)| one.exited == exited);
-        found.map(|(_, programs)| programs).expect("a known loop")
+        let entry = loops.find(|(entry, _)| entry.exited == exited);
+        entry.map(|(_, programs)| programs).expect("a known loop")
     }
 
     /// Buffers for the lists of a tile, if there are any.
@@ -280,7 +280,7 @@ impl ActiveWorlds {
             next,
             next_list,
         ];
-        let (found, at) = self.groups(iteration);
-        batch.dispatch_found(&compaction.list_programs(exited)[1], &bindings, found, at);
+        let (groups, at) = self.groups(iteration);
+        batch.dispatch_found(&compaction.list_programs(exited)[1], &bindings, groups, at);
     }
 }
