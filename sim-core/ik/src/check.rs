@@ -43,14 +43,14 @@ impl Checker {
         }
     }
 
-    /// Errors of the frames at a state. The first `own` frames are of the task.
+    /// Errors of the frames at a state. The first `own_reaches` frames are of the task.
     #[inline(always)]
     pub fn errors(
         &mut self,
         t: &Tables<f64>,
         q: &[f64],
         targets: &[Target<f64>],
-        own: usize,
+        own_reaches: usize,
     ) -> Errors {
         for &c in &t.coords {
             self.block.joint_q[c] = q[c];
@@ -58,9 +58,9 @@ impl Checker {
         place(t, &mut self.block, &mut self.slopes);
         let mut errors = Errors::default();
         for (k, (reach, target)) in t.reaches.iter().zip(targets).enumerate() {
-            let found = apart(reach, &self.block.work, target);
-            let [position, rotation] = squares(reach, &found).map(f64::sqrt);
-            let at = match k < own {
+            let deviation = apart(reach, &self.block.work, target);
+            let [position, rotation] = squares(reach, &deviation).map(f64::sqrt);
+            let at = match k < own_reaches {
                 true => [&mut errors.position, &mut errors.rotation],
                 false => {
                     let [position, rotation] = &mut errors.tied;

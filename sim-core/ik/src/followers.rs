@@ -35,9 +35,9 @@ impl Couplings {
     /// Those of a model, of equalities those that act at its start.
     pub fn from_model(model: &Model) -> Couplings {
         let m = model.constants();
-        let mut found = Couplings::default();
+        let mut couplings = Couplings::default();
         for equality in &m.equalities {
-            found.add(Lengths {
+            couplings.add(Lengths {
                 first: vec![term(equality.follower)],
                 second: vec![term(equality.leader)],
                 offsets: [0.0; 2],
@@ -51,11 +51,11 @@ impl Couplings {
             if let (Measure::Lengths(lengths), true) =
                 (&tie.measure, model.start().eq_active[place] != 0.0)
             {
-                found.add(lengths.clone());
+                couplings.add(lengths.clone());
             }
         }
-        found.sort();
-        found
+        couplings.sort();
+        couplings
     }
 
     /// Adds an equality: as a relation, unless its joint follows another one already or leads its own leader.
@@ -74,9 +74,9 @@ impl Couplings {
             self.lengths.push(lengths);
             return;
         }
-        let [own, other] = lengths.offsets;
+        let [first_offset, other] = lengths.offsets;
         let mut polynomial = lengths.polynomial;
-        polynomial[0] += own;
+        polynomial[0] += first_offset;
         self.relations.push(Relation {
             follower: first.dof,
             leader: leader.map(|leader| leader.dof),
@@ -125,17 +125,17 @@ impl Relation {
     }
 
     /// The part of the leader's range in which the follower is within its own; none if there is no such part.
-    pub fn leader_range(&self, leader: [f64; 2], own: [f64; 2]) -> Option<[f64; 2]> {
+    pub fn leader_range(&self, leader: [f64; 2], follower: [f64; 2]) -> Option<[f64; 2]> {
         let [constant, slope, rest @ ..] = self.polynomial;
         let slope = slope * self.scale;
         if rest == [0.0; 3] && slope != 0.0 {
             let base = constant - self.polynomial[1] * self.offset;
-            let ends = own.map(|end| (end - base) / slope);
+            let ends = follower.map(|end| (end - base) / slope);
             let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
             let range = [leader[0].max(low), leader[1].min(high)];
             return (range[0] <= range[1]).then_some(range);
         }
-        let is_inside = |x: f64| (own[0]..=own[1]).contains(&self.position(x));
+        let is_inside = |x: f64| (follower[0]..=follower[1]).contains(&self.position(x));
         let leader = [leader[0].max(-WINDOW), leader[1].min(WINDOW)];
         // the longest run of samples inside
         const SAMPLES: usize = 1000;

@@ -41,6 +41,6 @@ pub fn frame(model: &Model, name: &str) -> Result<Mount<f64>, IkError> {
 
 /// Names of all frames: links, sites, and sites of MuJoCo models.
 pub fn frame_names(model: &Model) -> Vec<String> {
-    let own = model.body_names().iter().chain(model.site_names());
-    own.chain(model.output_site_names()).cloned().collect()
+    let names = model.body_names().iter().chain(model.site_names());
+    names.chain(model.output_site_names()).cloned().collect()
 }

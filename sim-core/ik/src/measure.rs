@@ -122,7 +122,7 @@ pub fn apart<F: Lane>(
 ) -> Apart<F> {
     let (frame, other) = (&reach.frame, reach.relative_to.as_ref());
     let point = sites::position(w, frame);
-    let mut found = Apart {
+    let mut deviation = Apart {
         position: point - target.position,
         turn: Vec3::zero(),
         point,
@@ -132,32 +132,32 @@ pub fn apart<F: Lane>(
     };
     if reach.moves_reference {
         // the two are near each other: their difference loses nothing
-        found.position = point + (sites::reference(w, frame) - target.position);
+        deviation.position = point + (sites::reference(w, frame) - target.position);
     }
     if let Some(other) = other {
         if !reach.is_same_tree {
             let between = sites::reference(w, frame) - sites::reference(w, other);
-            found.point_of_other = point + between;
+            deviation.point_of_other = point + between;
         }
         let axes = sites::axes(w, other);
         let there = sites::position(w, other);
-        found.position = (found.point_of_other - there) - axes * target.position;
-        found.target = Mat3([
+        deviation.position = (deviation.point_of_other - there) - axes * target.position;
+        deviation.target = Mat3([
             axes * target.axes[0],
             axes * target.axes[1],
             axes * target.axes[2],
         ]);
-        found.other = Some(axes);
+        deviation.other = Some(axes);
     }
     if reach.rotation != Weight::None {
-        found.turn = rotation::between(&sites::axes(w, frame), &found.target);
+        deviation.turn = rotation::between(&sites::axes(w, frame), &deviation.target);
     }
-    found
+    deviation
 }
 
 /// Squares of what counts of the errors of a frame: position [m²], rotation [rad²].
 #[inline(always)]
-pub fn squares<F: Lane>(reach: &ReachTable<F::Real>, found: &Apart<F>) -> [F; 2] {
+pub fn squares<F: Lane>(reach: &ReachTable<F::Real>, deviation: &Apart<F>) -> [F; 2] {
     let zero = F::Real::default();
     let square = |weight: Weight<F::Real>, error: Vec3<F>, axes: Option<&Mat3<F>>| match weight {
         Weight::None => F::c(0.0),
@@ -174,8 +174,8 @@ pub fn squares<F: Lane>(reach: &ReachTable<F::Real>, found: &Apart<F>) -> [F; 2]
         }
     };
     [
-        square(reach.position, found.position, found.other.as_ref()),
-        square(reach.rotation, found.turn, Some(&found.target)),
+        square(reach.position, deviation.position, deviation.other.as_ref()),
+        square(reach.rotation, deviation.turn, Some(&deviation.target)),
     ]
 }
 
@@ -209,10 +209,10 @@ pub fn normal_equations<F: Lane>(
     n.gradient.fill(zero);
     (n.cost, n.worst) = (zero, zero);
     for (reach, target) in t.reaches.iter().zip(targets) {
-        let found = apart(reach, &block.work, target);
-        let [position, turn] = squares(reach, &found);
+        let deviation = apart(reach, &block.work, target);
+        let [position, turn] = squares(reach, &deviation);
         n.worst = n.worst.max((position * scales[0]).max(turn * scales[1]));
-        add_reach(reach, &block.work, slopes, &found, n);
+        add_reach(reach, &block.work, slopes, &deviation, n);
     }
     for length in &t.lengths {
         let (error, slope) = missing(length, &block.joint_q);
@@ -240,27 +240,27 @@ fn add_reach<F: Lane>(
     reach: &ReachTable<F::Real>,
     w: &Workspace<F>,
     slopes: &[F],
-    found: &Apart<F>,
+    deviation: &Apart<F>,
     n: &mut Normal<F>,
 ) {
     let has_position = reach.position != Weight::None;
     let has_rotation = reach.rotation != Weight::None;
-    let (world, target) = (found.other.as_ref(), Some(&found.target));
+    let (world, target) = (deviation.other.as_ref(), Some(&deviation.target));
     let rows = match (has_position, has_rotation) {
         (true, true) => 0..6,
         (true, false) => 0..3,
         _ => 3..6,
     };
     let mut error = [F::c(0.0); 6];
-    error[..3].copy_from_slice(&*weighted(reach.position, found.position, world));
-    error[3..].copy_from_slice(&*weighted(reach.rotation, found.turn, target));
+    error[..3].copy_from_slice(&*weighted(reach.position, deviation.position, world));
+    error[3..].copy_from_slice(&*weighted(reach.rotation, deviation.turn, target));
     for entry in &reach.entries {
         let Spatial([linear, angular]) = w.motion[entry.dof];
         let (mut moved, mut turned) = (Vec3::zero(), Vec3::zero());
         if has_position {
             let point = match entry.is_of_other {
-                true => found.point_of_other,
-                false => found.point,
+                true => deviation.point_of_other,
+                false => deviation.point,
             };
             let velocity = angular.cross_add(point, linear);
             moved = weighted(reach.position, velocity, world);
@@ -275,14 +275,14 @@ fn add_reach<F: Lane>(
             (moved, turned) = (moved * slopes[slope], turned * slopes[slope]);
         }
         let column = &mut n.columns[entry.column];
-        let own = [
+        let twist = [
             moved[0], moved[1], moved[2], turned[0], turned[1], turned[2],
         ];
         for i in 0..6 {
             column[i] = if entry.is_first {
-                own[i]
+                twist[i]
             } else {
-                column[i] + own[i]
+                column[i] + twist[i]
             };
         }
     }
@@ -305,19 +305,19 @@ fn add_columns<F: Lane>(
 ) {
     let mut place = 0;
     for (a, &variable) in variables.iter().enumerate() {
-        let own = n.columns[a];
+        let column = n.columns[a];
         for b in 0..a + 1 {
             let other = &n.columns[b];
             let mut sum = n.hessian[places[place]];
             for i in rows.clone() {
-                sum = own[i].fma(other[i], sum);
+                sum = column[i].fma(other[i], sum);
             }
             n.hessian[places[place]] = sum;
             place += 1;
         }
         let mut sum = n.gradient[variable];
         for i in rows.clone() {
-            sum = own[i].fma(error[i], sum);
+            sum = column[i].fma(error[i], sum);
         }
         n.gradient[variable] = sum;
     }
@@ -339,11 +339,11 @@ fn add_length<F: Lane>(
     for (side, factor) in [F::c(1.0), -slope].into_iter().enumerate() {
         for term in &length.terms[side] {
             let Some(column) = term.column else { continue };
-            let mut own = factor * F::k(term.coefficient);
+            let mut entry = factor * F::k(term.coefficient);
             if let Some(slope) = term.slope {
-                own = own * slopes[slope];
+                entry = entry * slopes[slope];
             }
-            n.columns[column][0] = n.columns[column][0] + own;
+            n.columns[column][0] = n.columns[column][0] + entry;
         }
     }
     n.cost = (error * error).fma(F::c(0.5), n.cost);

@@ -280,9 +280,9 @@ fn path(bodies: &[Body<f64>], body: Option<usize>) -> BTreeSet<usize> {
 }
 
 /// The dofs that move one of two bodies and not the other, rising.
-fn columns(bodies: &[Body<f64>], own: Option<usize>, other: Option<usize>) -> Vec<Column> {
-    let (own, other) = (path(bodies, own), path(bodies, other));
-    let apart = own.symmetric_difference(&other);
+fn columns(bodies: &[Body<f64>], body: Option<usize>, other: Option<usize>) -> Vec<Column> {
+    let (body_dofs, other) = (path(bodies, body), path(bodies, other));
+    let apart = body_dofs.symmetric_difference(&other);
     apart
         .map(|&dof| Column {
             dof,

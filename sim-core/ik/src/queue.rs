@@ -135,30 +135,30 @@ pub fn run<F: Lane>(
         while ended != 0 {
             let lane = ended.trailing_zeros() as usize;
             ended &= ended - 1;
-            let Some(mine) = open[lane].as_mut() else {
+            let Some(open_problem) = open[lane].as_mut() else {
                 continue;
             };
-            mine.solution.iterations += (clock - mine.begun) as u32;
-            q.copy_from_slice(row(job.problems.starts, coords, mine.problem));
+            open_problem.solution.iterations += (clock - open_problem.begun) as u32;
+            q.copy_from_slice(row(job.problems.starts, coords, open_problem.problem));
             for &(k, c) in &job.tables.moved {
                 q[c] = lanes.outbox.row(2 + k)[lane].to_f64();
             }
             starts::tidy(job.model, job.plan, &mut q);
-            let own = job.plan.own_reaches;
-            let errors = checker.errors(job.exact, &q, &mine.targets, own);
-            let place = mine.problem - range.start;
-            let is_last = take(mine, &errors, options);
-            if mine.attempt as u32 == mine.solution.restarts {
+            let own_reaches = job.plan.own_reaches;
+            let errors = checker.errors(job.exact, &q, &open_problem.targets, own_reaches);
+            let place = open_problem.problem - range.start;
+            let is_last = take(open_problem, &errors, options);
+            if open_problem.attempt as u32 == open_problem.solution.restarts {
                 joint_q[place * coords..(place + 1) * coords].copy_from_slice(&q);
             }
             if !is_last {
-                mine.attempt += 1;
-                mine.begun = clock;
-                again(job, &mut lanes, lane, mine);
+                open_problem.attempt += 1;
+                open_problem.begun = clock;
+                again(job, &mut lanes, lane, open_problem);
                 continue;
             }
-            mine.solution.restarts = mine.attempt as u32;
-            solutions[place] = mine.solution;
+            open_problem.solution.restarts = open_problem.attempt as u32;
+            solutions[place] = open_problem.solution;
             (open[lane], busy) = (None, busy - 1);
             if next < range.end {
                 open[lane] = Some(begin(job, &mut lanes, lane, next, clock));
@@ -169,16 +169,16 @@ pub fn run<F: Lane>(
 }
 
 /// Keeps an attempt if it is the best so far; its number is then `solution.restarts`. True if it is the last one.
-fn take(mine: &mut Open, errors: &Errors, options: &Options) -> bool {
+fn take(open_problem: &mut Open, errors: &Errors, options: &Options) -> bool {
     let worst = errors.worst(options.tolerance);
-    if worst < mine.worst || mine.attempt == 0 {
-        mine.worst = worst;
-        mine.solution.position_error = errors.position;
-        mine.solution.rotation_error = errors.rotation;
-        mine.solution.is_solved = errors.within(options.tolerance);
-        mine.solution.restarts = mine.attempt as u32;
+    if worst < open_problem.worst || open_problem.attempt == 0 {
+        open_problem.worst = worst;
+        open_problem.solution.position_error = errors.position;
+        open_problem.solution.rotation_error = errors.rotation;
+        open_problem.solution.is_solved = errors.within(options.tolerance);
+        open_problem.solution.restarts = open_problem.attempt as u32;
     }
-    mine.solution.is_solved || mine.attempt == options.restarts
+    open_problem.solution.is_solved || open_problem.attempt == options.restarts
 }
 
 /// Puts a problem into a lane.
@@ -230,8 +230,8 @@ fn begin<F: Lane>(
 }
 
 /// Puts the next attempt at its problem into a lane.
-fn again<F: Lane>(job: &Job<F::Real>, lanes: &mut Lanes<F>, lane: usize, mine: &Open) {
-    let (problem, attempt) = (mine.problem, mine.attempt);
+fn again<F: Lane>(job: &Job<F::Real>, lanes: &mut Lanes<F>, lane: usize, open_problem: &Open) {
+    let (problem, attempt) = (open_problem.problem, open_problem.attempt);
     let mut draws = Draws::new(job.options.seed, problem as u64, attempt as u64);
     let mut q = row(job.problems.starts, job.model.coords(), problem).to_vec();
     starts::draw(job.model, job.plan, &mut draws, &mut q);
@@ -271,12 +271,12 @@ fn target<R: Real>(job: &Job<R>, reach: usize, problem: usize) -> Target<f64> {
     }
     let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
     let axes: Mat3<f64> = quat::matrix(quaternion.map(|x| x / norm));
-    let own = &job.plan.reaches[reach];
+    let planned = &job.plan.reaches[reach];
     let mut position = Vec3(position);
     if let (None, false, Some(tree)) = (
-        &own.relative_to,
+        &planned.relative_to,
         job.exact.reaches[reach].moves_reference,
-        own.frame.tree,
+        planned.frame.tree,
     ) {
         position = position - Vec3(job.model.constants().trees[tree].base);
     }

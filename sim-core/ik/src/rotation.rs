@@ -95,12 +95,12 @@ mod tests {
                 let turn = Vec3(axis) * angle;
                 let by = quat::matrix(quat::exp(turn));
                 let to = Mat3([by * from[0], by * from[1], by * from[2]]);
-                let found = between(&to, &from);
-                let error = found - turn;
+                let vector = between(&to, &from);
+                let error = vector - turn;
                 // quat::matrix and three products: a few roundings of 1, times π at most
                 assert!(
                     error.dot(error).sqrt() < 1e-14 * (1.0 + PI),
-                    "{axis:?} {angle}: {found:?}"
+                    "{axis:?} {angle}: {vector:?}"
                 );
             }
         }
@@ -113,10 +113,10 @@ mod tests {
             let mut q = [0.0f32; 4];
             q[axis] = 1.0;
             let from: Mat3<f32> = Mat3(from.0.map(|column| Vec3(column.0.map(|x| x as f32))));
-            let found = between(&quat::matrix(q), &from);
+            let vector = between(&quat::matrix(q), &from);
             for i in 0..3 {
                 let expected = if i == axis { std::f32::consts::PI } else { 0.0 };
-                assert!((found[i].abs() - expected).abs() < 1e-6, "{found:?}");
+                assert!((vector[i].abs() - expected).abs() < 1e-6, "{vector:?}");
             }
         }
     }

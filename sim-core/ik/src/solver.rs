@@ -123,15 +123,15 @@ impl Solver {
         let (coords, count) = (self.model.coords(), problems.count);
         let mut arrays = vec![("joint_q".to_owned(), problems.starts, coords, false)];
         arrays.push(("posture".to_owned(), problems.postures, coords, true));
-        let own = &self.plan.reaches[..self.plan.own_reaches];
+        let reaches = &self.plan.reaches[..self.plan.own_reaches];
         for (what, all, columns) in [
             ("position", &problems.positions, 3),
             ("orientation", &problems.orientations, 4),
         ] {
-            if all.len() != own.len() {
-                return Err(length(what, all.len(), own.len(), 1));
+            if all.len() != reaches.len() {
+                return Err(length(what, all.len(), reaches.len(), 1));
             }
-            for (reach, &array) in own.iter().zip(all) {
+            for (reach, &array) in reaches.iter().zip(all) {
                 let weights = match columns {
                     3 => reach.position_weight,
                     _ => reach.orientation_weight,

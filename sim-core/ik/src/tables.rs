@@ -275,14 +275,17 @@ where
     f64: Recast<R, Out = R>,
 {
     let reach = &plan.reaches[k];
-    let of = |dof: usize| plan.variable_of[dof].expect("columns are of variables");
+    let variable_of = |dof: usize| plan.variable_of[dof].expect("columns are of variables");
     let mut columns = plan.columns[k].clone();
-    columns.sort_by_key(|column| (of(column.dof), column.dof));
-    let mut variables: Vec<usize> = columns.iter().map(|column| of(column.dof)).collect();
+    columns.sort_by_key(|column| (variable_of(column.dof), column.dof));
+    let mut variables: Vec<usize> = columns
+        .iter()
+        .map(|column| variable_of(column.dof))
+        .collect();
     variables.dedup();
     let mut entries: Vec<Entry> = Vec::new();
     for column in columns {
-        let place = variables.binary_search(&of(column.dof));
+        let place = variables.binary_search(&variable_of(column.dof));
         let place = place.expect("it is one of them");
         let last = entries.last().map(|entry| entry.column);
         entries.push(Entry {

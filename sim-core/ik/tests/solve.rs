@@ -107,17 +107,17 @@ fn poses(model: &Model, q: &[f64]) -> Vec<[f64; 7]> {
 /// Reachable targets of some links: positions and quaternions of each, from random states.
 fn targets(model: &Model, links: &[&str], count: usize) -> [Vec<Vec<f64>>; 2] {
     let mut unit = uniform(7);
-    let mut found = [vec![Vec::new(); links.len()], vec![Vec::new(); links.len()]];
+    let mut targets = [vec![Vec::new(); links.len()], vec![Vec::new(); links.len()]];
     for _ in 0..count {
         let poses = poses(model, &state(model, &mut unit));
         for (k, link) in links.iter().enumerate() {
             let at = model.body_names().iter().position(|name| name == link);
             let pose = poses[at.unwrap()];
-            found[0][k].extend_from_slice(&pose[..3]);
-            found[1][k].extend_from_slice(&pose[3..]);
+            targets[0][k].extend_from_slice(&pose[..3]);
+            targets[1][k].extend_from_slice(&pose[3..]);
         }
     }
-    found
+    targets
 }
 
 /// Distance and angle between a link and its target.
@@ -168,8 +168,8 @@ fn check(model: &Model, links: &[&str], solved: &Solved) -> usize {
             let pose = &poses[at.unwrap()];
             let position = &solved.targets[0][r][3 * k..3 * k + 3];
             let orientation = &solved.targets[1][r][4 * k..4 * k + 4];
-            let own = errors(pose, position, orientation);
-            worst = [worst[0].max(own[0]), worst[1].max(own[1])];
+            let pose_errors = errors(pose, position, orientation);
+            worst = [worst[0].max(pose_errors[0]), worst[1].max(pose_errors[1])];
         }
         // both are double precision; angles by quaternions and by matrices
         assert!((worst[0] - solution.position_error).abs() < 1e-12);
@@ -245,8 +245,8 @@ fn a_result_depends_on_no_width_thread_or_number() {
         all.unwrap()
     };
     let bits = |q: &[f64]| q.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
-    let (all, found) = run(count, Width::Auto, 1);
-    assert!(found.iter().any(|solution| solution.restarts > 0));
+    let (all, solutions) = run(count, Width::Auto, 1);
+    assert!(solutions.iter().any(|solution| solution.restarts > 0));
     for (few, width, threads) in [
         (1, Width::Auto, 1),
         (7, Width::Eight, 2),
@@ -256,7 +256,7 @@ fn a_result_depends_on_no_width_thread_or_number() {
     ] {
         let (some, other) = run(few, width, threads);
         assert_eq!(bits(&some), bits(&all[..few * model.coords()]));
-        for (a, b) in other.iter().zip(&found) {
+        for (a, b) in other.iter().zip(&solutions) {
             assert_eq!((a.iterations, a.restarts), (b.iterations, b.restarts));
         }
     }
@@ -344,8 +344,8 @@ fn a_target_out_of_reach_leaves_joints_within_limits_and_reports_it() {
         orientations: vec![&orientations],
     };
     let all = solver.solve(&problems, OPTIONS, Precision::F32, Width::Auto, 1);
-    let (q, found) = all.unwrap();
-    assert!(!found[0].is_solved && found[0].position_error > 1.0);
+    let (q, solutions) = all.unwrap();
+    assert!(!solutions[0].is_solved && solutions[0].position_error > 1.0);
     for limit in &model.constants().limits {
         let q = q[model.constants().dofs[limit.dof].coord];
         assert!(limit.lower <= q && q <= limit.upper, "{q}: {limit:?}");
