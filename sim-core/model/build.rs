@@ -27,14 +27,14 @@ fn main() {
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
+    let mut paths = Vec::new();
     for entry in fs::read_dir(folder).expect("a source folder is readable") {
         let path = entry.expect("a source folder is readable").path();
         match path.is_dir() {
-            true => found.extend(files(&path)),
-            false => found.push(path),
+            true => paths.extend(files(&path)),
+            false => paths.push(path),
         }
     }
-    found.sort();
-    found
+    paths.sort();
+    paths
 }

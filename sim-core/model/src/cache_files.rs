@@ -167,8 +167,8 @@ mod tests {
                     for round in 0..100 {
                         let k = (thread + round) % 4;
                         let path = folder.0.join(k.to_string());
-                        if let Some(found) = load(&path, 1 << 20) {
-                            assert_eq!(found, bodies[k]);
+                        if let Some(bytes) = load(&path, 1 << 20) {
+                            assert_eq!(bytes, bodies[k]);
                         }
                         store(&path, &bodies[k], 3 * 5032);
                     }

@@ -62,11 +62,11 @@ impl GeomContact {
             std::cmp::Ordering::Equal => None,
         };
         let (margin, gap) = (self.margin + other.margin, self.gap + other.gap);
-        if let Some(one) = decides {
+        if let Some(geom) = decides {
             return GeomContact {
                 margin,
                 gap,
-                ..*one
+                ..*geom
             };
         }
         let share = match (self.solmix >= WEIGHT_MIN, other.solmix >= WEIGHT_MIN) {

@@ -262,7 +262,7 @@ mod tests {
             at(0)..at(1)
         });
         assert_eq!(spans, [0..32, 32..33]);
-        let mut found = Vec::new();
+        let mut listed = Vec::new();
         for cluster in 0..placed.clusters.rows {
             let ball: [f64; 4] = std::array::from_fn(|k| number(placed.clusters, 4 * cluster + k));
             let rows =
@@ -275,12 +275,12 @@ mod tests {
                 let from: [f64; 3] = std::array::from_fn(|i| x[i] - ball[i]);
                 assert!(dot(from, from).sqrt() < ball[3], "cluster {cluster}: {x:?}");
                 if spans[0].contains(&cluster) {
-                    found.push(x.map(f64::to_bits));
+                    listed.push(x.map(f64::to_bits));
                 }
             }
         }
-        found.sort_unstable();
-        found.dedup();
+        listed.sort_unstable();
+        listed.dedup();
         let center = frames[0].center;
         let mut given: Vec<_> = large
             .vertices
@@ -288,7 +288,7 @@ mod tests {
             .map(|x| std::array::from_fn(|i| (x[i] - center[i]).to_bits()))
             .collect();
         given.sort_unstable();
-        assert_eq!(found, given);
+        assert_eq!(listed, given);
     }
 
     #[test]

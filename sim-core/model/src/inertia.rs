@@ -76,14 +76,14 @@ pub(crate) fn merge(body: &Inertial, pose: &Pose, other: &Inertial) -> Inertial 
         (other.mass, other_pos, pose.rotate_tensor(other.inertia)),
     ];
     let mut inertia = [[0.0; 3]; 3];
-    for (mass, centre, own) in parts {
+    for (mass, centre, tensor) in parts {
         // parallel axes: I + m (|d|² 1 − d dᵀ)
         let d: [f64; 3] = std::array::from_fn(|i| centre[i] - pos[i]);
         let square = d.iter().map(|part| part * part).sum::<f64>();
         for i in 0..3 {
             for j in 0..3 {
                 let unit = if i == j { square } else { 0.0 };
-                inertia[i][j] += own[i][j] + mass * (unit - d[i] * d[j]);
+                inertia[i][j] += tensor[i][j] + mass * (unit - d[i] * d[j]);
             }
         }
     }

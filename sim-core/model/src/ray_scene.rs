@@ -175,7 +175,7 @@ impl<'a> World<'a> {
     fn cast(&self, ray: &Ray) -> (f64, i32, [f64; 3]) {
         let d = ray.direction;
         let a = dot3(&d, d);
-        let mut found = (f64::INFINITY, -1, [0.0; 3]);
+        let mut nearest = (f64::INFINITY, -1, [0.0; 3]);
         for (sphere, target) in self.spheres.iter().zip(&self.targets) {
             let apart = [0, 1, 2].map(|k| ray.origin[k] - sphere.center[k]);
             let (b, c) = (dot3(&d, apart), dot3(&apart, apart) - sphere.square);
@@ -186,7 +186,7 @@ impl<'a> World<'a> {
                 continue;
             }
             // it enters the sphere behind what it meets
-            let before = -b - found.0 * a;
+            let before = -b - nearest.0 * a;
             if c > 0.0 && before > 0.0 && before * before > inside {
                 continue;
             }
@@ -197,17 +197,17 @@ impl<'a> World<'a> {
             let apart = [0, 1, 2].map(|k| ray.origin[k] - p[k]);
             let to_local =
                 |v: [f64; 3]| [0, 1, 2].map(|k| m[k] * v[0] + m[k + 3] * v[1] + m[k + 6] * v[2]);
-            let met = target.shape.cast(to_local(apart), to_local(d), found.0);
+            let met = target.shape.cast(to_local(apart), to_local(d), nearest.0);
             if let Some((far, normal)) = met
-                && far < found.0
+                && far < nearest.0
             {
                 let normal = [0, 1, 2].map(|k| dot3(&m[3 * k..], normal));
-                found = (far, target.geom as i32, normal);
+                nearest = (far, target.geom as i32, normal);
             }
         }
-        match found.1 {
+        match nearest.1 {
             -1 => (-1.0, -1, [0.0; 3]),
-            _ => found,
+            _ => nearest,
         }
     }
 }

@@ -23,47 +23,50 @@ pub(super) struct Scene<'a> {
 }
 
 /// Adds an actuator to those before it.
-pub(super) fn add(to: &mut Actuators<f64>, own: &description::Actuator, scene: &Scene<'_>) {
-    let (terms, turning) = length(&own.length, scene, moments(to));
-    let activation = own.activation.map(|own| {
+pub(super) fn add(to: &mut Actuators<f64>, actuator: &description::Actuator, scene: &Scene<'_>) {
+    let (terms, turning) = length(&actuator.length, scene, moments(to));
+    let activation = actuator.activation.map(|described| {
         let place = to.activations;
         to.activations += 1;
-        activation(&own, place, scene.dt)
+        activation(&described, place, scene.dt)
     });
     to.all.push(Actuator {
         terms,
         turning,
         activation,
-        ctrl_range: own.ctrl_range,
-        force_range: own.force_range,
-        gain: own.gain,
-        bias: own.bias,
+        ctrl_range: actuator.ctrl_range,
+        force_range: actuator.force_range,
+        gain: actuator.gain,
+        bias: actuator.bias,
     });
 }
 
 /// Moments of the actuators so far.
 fn moments(of: &Actuators<f64>) -> usize {
-    let turning = of.all.iter().filter_map(|own| own.turning.as_ref());
+    let turning = of
+        .all
+        .iter()
+        .filter_map(|actuator| actuator.turning.as_ref());
     turning.map(|length| length.dofs.len()).sum()
 }
 
-fn activation(own: &ActuatorActivation, place: usize, dt: f64) -> Activation<f64> {
+fn activation(activation: &ActuatorActivation, place: usize, dt: f64) -> Activation<f64> {
     Activation {
         place,
-        rate: own.rate,
-        reach: match own.rate {
+        rate: activation.rate,
+        reach: match activation.rate {
             // ȧ T (1 - exp(-h/T))
-            ActivationRate::Filter(time) if own.exact => -time * (-dt / time).exp_m1(),
+            ActivationRate::Filter(time) if activation.exact => -time * (-dt / time).exp_m1(),
             _ => dt,
         },
-        range: own.range,
-        early: own.early,
+        range: activation.range,
+        early: activation.early,
     }
 }
 
 type Length = (Vec<Term<f64>>, Option<TurningLength<f64>>);
 
-fn length(own: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
+fn length(length: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
     let turning = |kind, gear, dofs| TurningLength {
         kind,
         gear,
@@ -72,7 +75,7 @@ fn length(own: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
     };
     // forces of free joints are in the axes of the model's world, which is link 0
     let placed = |v: [f64; 3]| scene.carriers[0].pose.rotate(v);
-    let turning = match own {
+    let turning = match length {
         ActuatorLength::Joints(joints) => return (terms(joints, scene.dof_of), None),
         ActuatorLength::Ball {
             joint,
@@ -119,10 +122,10 @@ fn length(own: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
                 let dofs = body.map(|body| path(scene.bodies, body));
                 dofs.into_iter().flatten().collect::<Vec<_>>()
             };
-            let own = moved(site.body);
+            let site_dofs = moved(site.body);
             let other = moved(reference.as_ref().and_then(|mount| mount.body));
-            let mut dofs: Vec<usize> = own.iter().chain(&other).copied().collect();
-            dofs.retain(|dof| own.contains(dof) != other.contains(dof));
+            let mut dofs: Vec<usize> = site_dofs.iter().chain(&other).copied().collect();
+            dofs.retain(|dof| site_dofs.contains(dof) != other.contains(dof));
             dofs.sort_unstable();
             turning(LengthKind::Site(Sites { site, reference }), *gear, dofs)
         }
@@ -133,9 +136,9 @@ fn length(own: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
 /// The body that a joint moves.
 fn body_of(scene: &Scene<'_>, joint: usize) -> usize {
     let dof = scene.dof_of[joint];
-    let found = scene
+    let body = scene
         .bodies
         .iter()
         .position(|body| body.dofs().contains(&dof));
-    found.expect("every dof has a body")
+    body.expect("every dof has a body")
 }

@@ -90,9 +90,9 @@ impl BodyBuilder {
         let mut carriers = vec![base; robot.links.len()];
         let mut dof_of = vec![0; robot.joints.len()];
         for link in robot.link_order() {
-            let own = robot.joints.iter().enumerate();
+            let joints = robot.joints.iter().enumerate();
             let mut first = true;
-            for (index, joint) in own.filter(|(_, joint)| joint.child == link) {
+            for (index, joint) in joints.filter(|(_, joint)| joint.child == link) {
                 let parent = joint.parent.map_or(base, |parent| carriers[parent]);
                 let mut at = match first {
                     true => Carrier {
@@ -107,8 +107,8 @@ impl BodyBuilder {
                     at = self.rooted(at);
                 }
                 dof_of[index] = self.dofs.len();
-                let own = robot.precompiled.as_ref().map(|parts| &parts.joints[index]);
-                carriers[link] = self.add_joint(joint, own, at);
+                let extras = robot.precompiled.as_ref().map(|parts| &parts.joints[index]);
+                carriers[link] = self.add_joint(joint, extras, at);
             }
             let mocaps = robot.precompiled.as_ref().map(|parts| &parts.mocaps);
             if mocaps.is_some_and(|mocaps| mocaps.contains(&link)) {
@@ -164,8 +164,8 @@ impl BodyBuilder {
         }
     }
 
-    /// The bodies of a joint whose frame is `at`; returns where they carry its link. `own` is what only MuJoCo's joints have.
-    fn add_joint(&mut self, joint: &Joint, own: Option<&JointExtras>, at: Carrier) -> Carrier {
+    /// The bodies of a joint whose frame is `at`; returns where they carry its link. Only MuJoCo joints have `extras`.
+    fn add_joint(&mut self, joint: &Joint, extras: Option<&JointExtras>, at: Carrier) -> Carrier {
         let turn = z_to(joint.axis);
         let mut back = turn.inverse();
         let mut at = at;
@@ -173,13 +173,13 @@ impl BodyBuilder {
             pose: at.pose.mul(&turn),
             ..at
         };
-        if let Some(own) = own {
-            let there = Pose::at(own.anchor);
-            let away = Pose::at(own.anchor.map(|x| -x));
+        if let Some(extras) = extras {
+            let there = Pose::at(extras.anchor);
+            let away = Pose::at(extras.anchor.map(|x| -x));
             // at its reference the joint leaves its link where it is
             let rest = match joint.kind {
-                JointKind::Revolute => Pose::about([0.0, 0.0, 1.0], -own.reference),
-                _ => Pose::at([0.0, 0.0, -own.reference]),
+                JointKind::Revolute => Pose::about([0.0, 0.0, 1.0], -extras.reference),
+                _ => Pose::at([0.0, 0.0, -extras.reference]),
             };
             axis.pose = at.pose.mul(&there).mul(&turn).mul(&rest);
             back = back.mul(&away);
@@ -309,18 +309,18 @@ impl BodyBuilder {
             (self.actuator_names.len(), self.constraints.len());
         add_frames(&mut self.outputs, parts, carriers, first_link);
         for index in robot.moving_joints() {
-            let (joint, own) = (&robot.joints[index], &parts.joints[index]);
+            let (joint, extras) = (&robot.joints[index], &parts.joints[index]);
             let dofs = dof_of[index]..dof_of[index] + joint.dofs.len();
             for dof in dofs.clone() {
                 self.joints[dof].soft = Some(SoftJoint {
-                    limit: own.limit,
-                    margin: own.margin,
-                    friction: own.friction,
+                    limit: extras.limit,
+                    margin: extras.margin,
+                    friction: extras.friction,
                     safe_references: parts.safe_references,
                 });
             }
-            self.add_passive(joint, own, dofs.clone());
-            if let Some(range) = own.actuator_range {
+            self.add_passive(joint, extras, dofs.clone());
+            if let Some(range) = extras.actuator_range {
                 let dof = dofs.start;
                 let bounds = &mut self.actuators.dof_bounds;
                 bounds.push(ActuatorBound { dof, range });
@@ -330,7 +330,7 @@ impl BodyBuilder {
         self.add_drags(parts, carriers);
         let first_equality = self.switches;
         for constraint in &parts.constraints {
-            let own = DofConstraint::new(
+            let compiled = DofConstraint::new(
                 constraint,
                 dof_of,
                 carriers,
@@ -339,8 +339,8 @@ impl BodyBuilder {
                 first_equality,
                 parts.safe_references,
             );
-            self.couplings.extend(own.couplings());
-            self.constraints.push(own);
+            self.couplings.extend(compiled.couplings());
+            self.constraints.push(compiled);
         }
         self.switches += parts.equalities.len();
         for (name, is_active) in &parts.equalities {

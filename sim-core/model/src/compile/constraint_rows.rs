@@ -57,7 +57,9 @@ pub(super) fn add_rows(
         let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
         if (joint.friction > 0.0 || friction_varies) && !moves_freely {
             let soft = match joint.soft {
-                Some(own) => own_soft(&own.friction, weight, dt, own.safe_references),
+                Some(soft_joint) => {
+                    own_soft(&soft_joint.friction, weight, dt, soft_joint.safe_references)
+                }
                 None => soft(SOLREF, weight, dt),
             };
             // a friction row has no position: its impedance is d_min, its reference -b v
@@ -72,9 +74,9 @@ pub(super) fn add_rows(
                 zone: regularizer * joint.friction,
             });
         }
-        if let (Some([lower, upper]), Some(own)) = (joint.range, joint.soft) {
-            let soft = own_soft(&own.limit, weight, dt, own.safe_references);
-            let (lower, upper) = (lower + own.margin, upper - own.margin);
+        if let (Some([lower, upper]), Some(soft_joint)) = (joint.range, joint.soft) {
+            let soft = own_soft(&soft_joint.limit, weight, dt, soft_joint.safe_references);
+            let (lower, upper) = (lower + soft_joint.margin, upper - soft_joint.margin);
             // where both sides may act at once, each has a row of its own
             let sides = match lower < upper {
                 true => vec![[lower, upper]],

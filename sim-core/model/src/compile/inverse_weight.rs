@@ -220,9 +220,9 @@ mod tests {
             true => n as f64,
             false => libm::sin((i * j + i.min(j)) as f64),
         });
-        let ours = inverse(&matrix).unwrap();
-        let theirs = matrix.llt(faer::Side::Lower).unwrap().inverse();
-        let largest = (&ours - &theirs).norm_max();
+        let actual = inverse(&matrix).unwrap();
+        let expected = matrix.llt(faer::Side::Lower).unwrap().inverse();
+        let largest = (&actual - &expected).norm_max();
         // n sums of n roundings each, times the condition, of entries of 1/n
         let tolerance = (n * n) as f64 * f64::EPSILON;
         assert!(largest > 0.0 && largest < tolerance, "{largest:e}");

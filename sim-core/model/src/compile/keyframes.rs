@@ -32,10 +32,10 @@ pub(super) fn states(
             state.name = format!("{}/{}", robot.name, key.name);
             state.joint_q[range.coords.clone()].copy_from_slice(&key.qpos);
             state.joint_qd[range.dofs.clone()].copy_from_slice(&key.qvel);
-            let own = bodies
+            let robot_bodies = bodies
                 .iter()
                 .filter(|body| range.coords.contains(&body.coord));
-            for body in own.filter(|body| body.motion.coords() > 1) {
+            for body in robot_bodies.filter(|body| body.motion.coords() > 1) {
                 convert(robot, body, &mut state);
             }
             put(&mut state.act, first_act, &key.act);
@@ -44,7 +44,9 @@ pub(super) fn states(
             all.push(state);
         }
         let acting = parts.actuators.iter();
-        first_act += acting.filter(|own| own.activation.is_some()).count();
+        first_act += acting
+            .filter(|actuator| actuator.activation.is_some())
+            .count();
         first_mocap += parts.mocaps.len();
     }
     all

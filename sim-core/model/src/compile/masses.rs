@@ -18,8 +18,10 @@ pub(super) fn starts(scene: &Description) -> SceneStarts {
     for robot in &scene.robots {
         for link in robot.link_order() {
             let inertial = robot.links[link].inertial.as_ref();
-            starts.masses.push(inertial.map_or(0.0, |own| own.mass));
-            let tensor = inertial.map_or([[0.0; 3]; 3], |own| own.inertia);
+            starts
+                .masses
+                .push(inertial.map_or(0.0, |inertial| inertial.mass));
+            let tensor = inertial.map_or([[0.0; 3]; 3], |inertial| inertial.inertia);
             starts.inertias.push(packed(tensor));
         }
     }

@@ -16,13 +16,13 @@ pub(super) fn add_frames(
     let first = frames.bodies.len();
     let mount = |on: &OnLink| mounted_on(carriers, on);
     for (link, inertia) in parts.frames.inertias.iter().enumerate() {
-        let own = |pose| mounted_on(carriers, &OnLink { link, pose });
+        let mounted = |pose| mounted_on(carriers, &OnLink { link, pose });
         frames.bodies.push(OutputBody {
             link: first_link + link,
             parent: first + parts.parents[link],
             root: first + root(&parts.parents, link),
-            frame: own(crate::Pose::identity()),
-            inertial: own(inertia.pose),
+            frame: mounted(crate::Pose::identity()),
+            inertial: mounted(inertia.pose),
             mass: inertia.mass,
             moments: inertia.moments,
         });

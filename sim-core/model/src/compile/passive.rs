@@ -15,27 +15,27 @@ use std::ops::Range;
 
 impl BodyBuilder {
     /// What acts on a joint by itself. `dofs` are its own.
-    pub(super) fn add_passive(&mut self, joint: &Joint, own: &JointExtras, dofs: Range<usize>) {
+    pub(super) fn add_passive(&mut self, joint: &Joint, extras: &JointExtras, dofs: Range<usize>) {
         let body = self.dofs[dofs.start].body;
         let has_pose = matches!(joint.kind, JointKind::Ball | JointKind::Free);
-        if own.stiffness != 0.0 && has_pose {
+        if extras.stiffness != 0.0 && has_pose {
             self.springs.poses.push(PoseSpring {
                 body,
-                stiffness: own.stiffness,
-                position: own.spring_pose.pos,
-                quat: own.spring_pose.quat,
+                stiffness: extras.stiffness,
+                position: extras.spring_pose.pos,
+                quat: extras.spring_pose.quat,
             });
-        } else if own.stiffness != 0.0 {
+        } else if extras.stiffness != 0.0 {
             self.springs.joints.push(Spring {
                 dof: dofs.start,
-                stiffness: own.stiffness,
-                rest: own.spring_ref,
+                stiffness: extras.stiffness,
+                rest: extras.spring_ref,
             });
         }
         if joint.kind == JointKind::Free {
             self.free_joints.push(body);
         }
-        match own.compensator {
+        match extras.compensator {
             Compensator::Passive => self.compensation.passive_dofs.extend(dofs),
             Compensator::Actuators => self.compensation.actuated_dofs.extend(dofs),
             Compensator::Nothing => {}
@@ -74,7 +74,10 @@ impl BodyBuilder {
         let first = self.frames.len() - robot.links.len();
         // frames are in the order of links
         for (place, link) in robot.link_order().into_iter().enumerate() {
-            let share = parts.compensations.iter().find(|(own, _)| *own == link);
+            let share = parts
+                .compensations
+                .iter()
+                .find(|(compensated, _)| *compensated == link);
             let (Some(&(_, share)), Some(body)) = (share, carriers[link].body) else {
                 continue;
             };
@@ -98,9 +101,9 @@ pub(super) fn keep_acting(m: &mut Constants<f64>, scene: &Description) {
     let varies = varies.iter().any(|param| scene.params.contains(param));
     let (bodies, dofs) = (&m.bodies, &m.dofs);
     m.free_joints.retain(|&body| {
-        let own = &dofs[bodies[body].dofs()];
+        let body_dofs = &dofs[bodies[body].dofs()];
         varies
-            || own
+            || body_dofs
                 .iter()
                 .any(|dof| dof.armature != 0.0 || dof.damping != 0.0)
     });

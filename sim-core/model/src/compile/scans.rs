@@ -50,7 +50,7 @@ impl Description {
 /// The planes and height fields that a scan sees, and the rows of fields.
 fn ground(contacts: &Contacts<f64>, what: &str) -> Result<Vec<(usize, usize)>, ModelError> {
     let mut fields = 0;
-    let mut found = Vec::new();
+    let mut grounds = Vec::new();
     for (place, solid) in contacts.solids.iter().enumerate() {
         let up = solid.axes[2][2];
         match solid.kind {
@@ -60,16 +60,16 @@ fn ground(contacts: &Contacts<f64>, what: &str) -> Result<Vec<(usize, usize)>, M
                 return Err(ModelError::HeightField(what.to_owned(), reason.to_owned()));
             }
             Kind::Field => {
-                found.push((place, fields));
+                grounds.push((place, fields));
                 fields += 1;
             }
-            Kind::Plane if solid.body.is_none() && up > LEVEL => found.push((place, 0)),
+            Kind::Plane if solid.body.is_none() && up > LEVEL => grounds.push((place, 0)),
             _ => {}
         }
     }
-    if found.is_empty() {
+    if grounds.is_empty() {
         let reason = "the scene has no plane or height field that anything touches; add one";
         return Err(ModelError::HeightField(what.to_owned(), reason.to_owned()));
     }
-    Ok(found)
+    Ok(grounds)
 }

@@ -103,11 +103,11 @@ impl Scope<'_> {
         match sense {
             Sense::Vector(site, vector) => SensorKind::Vector(mount(site), *vector),
             Sense::Length {
-                terms: own,
+                terms: length_terms,
                 is_rate,
             } => match is_rate {
-                true => SensorKind::Rate(terms(own, self.dof_of)),
-                false => SensorKind::Length(terms(own, self.dof_of)),
+                true => SensorKind::Rate(terms(length_terms, self.dof_of)),
+                false => SensorKind::Length(terms(length_terms, self.dof_of)),
             },
             Sense::Actuator { actuator, is_rate } => match is_rate {
                 true => SensorKind::ActuatorRate(self.first_actuator + actuator),
@@ -154,18 +154,18 @@ impl Scope<'_> {
                 is_torque: *is_torque,
             }),
             Sense::ActuatorForces(actuators) => {
-                let own = actuators
+                let actuators = actuators
                     .iter()
                     .map(|actuator| self.first_actuator + actuator);
-                SensorKind::ActuatorForces(own.collect())
+                SensorKind::ActuatorForces(actuators.collect())
             }
             Sense::JointActuatorForce(joint) => SensorKind::DofActuatorForce(self.dof_of[*joint]),
             Sense::JointLimit(joint, part) => SensorKind::DofLimit(self.dof_of[*joint], *part),
             Sense::ConstraintLimit(constraint, part) => {
-                let own = constraint
+                let constraints = constraint
                     .iter()
                     .map(|constraint| self.first_constraint + constraint);
-                SensorKind::TieLimit(own.collect(), *part)
+                SensorKind::TieLimit(constraints.collect(), *part)
             }
             Sense::Touch(zone) => SensorKind::Touch(TouchSensor {
                 zone: self.zone(zone),
@@ -188,8 +188,8 @@ impl Scope<'_> {
                 capsules: Vec::new(),
             }),
             Sense::Range(site, geoms) => {
-                let own = geoms.iter().map(|geom| self.first_ray_geom + geom);
-                SensorKind::Range(mount(site), own.collect())
+                let geoms = geoms.iter().map(|geom| self.first_ray_geom + geom);
+                SensorKind::Range(mount(site), geoms.collect())
             }
             Sense::PotentialEnergy => SensorKind::PotentialEnergy([0.0; 3]),
             Sense::KineticEnergy => SensorKind::KineticEnergy,
@@ -207,8 +207,8 @@ impl Scope<'_> {
 
     /// First moment of what stands still [kg·m].
     fn static_moment(&self) -> [f64; 3] {
-        let own = &self.frames.bodies[self.first_body..];
-        let fixed = own.iter().filter(|body| body.frame.body.is_none());
+        let bodies = &self.frames.bodies[self.first_body..];
+        let fixed = bodies.iter().filter(|body| body.frame.body.is_none());
         fixed.fold([0.0; 3], |sum, body| {
             let base = body
                 .inertial
@@ -232,9 +232,10 @@ pub(super) fn finish_sensors(
             SensorKind::PotentialEnergy(moment) => *moment = static_moment,
             SensorKind::TieLimit(ties, _) => {
                 let constraints = std::mem::take(ties);
-                let own = constraint_of_tie.iter().enumerate();
-                let own = own.filter(|(_, constraint)| constraints.contains(constraint));
-                ties.extend(own.map(|(tie, _)| tie));
+                let numbered_ties = constraint_of_tie.iter().enumerate();
+                let limited_ties =
+                    numbered_ties.filter(|(_, constraint)| constraints.contains(constraint));
+                ties.extend(limited_ties.map(|(tie, _)| tie));
             }
             _ => {}
         }

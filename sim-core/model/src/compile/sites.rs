@@ -25,7 +25,7 @@ impl Description {
         };
         let sites = self.sites.iter().map(|site| {
             let what = format!("site `{}`", site.name);
-            let own = mount(self.bearer(&what, site.body.as_deref())?, &site.pose);
+            let frame = mount(self.bearer(&what, site.body.as_deref())?, &site.pose);
             let relative_to = match site.relative_to.as_deref() {
                 None => None,
                 other => {
@@ -35,8 +35,8 @@ impl Description {
             };
             let other = relative_to.as_ref().and_then(|other| other.body);
             Ok(Site {
-                columns: columns(bodies, own.body, other),
-                mount: own,
+                columns: columns(bodies, frame.body, other),
+                mount: frame,
                 relative_to,
                 damping: site.damping,
             })
@@ -53,17 +53,17 @@ impl Description {
 }
 
 /// The dofs that move one of two bodies and not the other, rising.
-fn columns(bodies: &[Body<f64>], own: Option<usize>, other: Option<usize>) -> Vec<Column> {
-    let [own, other] =
-        [own, other].map(|body| body.map_or_else(Vec::new, |body| path(bodies, body)));
+fn columns(bodies: &[Body<f64>], bearer: Option<usize>, other: Option<usize>) -> Vec<Column> {
+    let [bearer_dofs, other] =
+        [bearer, other].map(|body| body.map_or_else(Vec::new, |body| path(bodies, body)));
     let alone = |dofs: &[usize], without: &[usize], is_of_other| {
         let alone = dofs.iter().copied().filter(|dof| !without.contains(dof));
         alone
             .map(|dof| Column { dof, is_of_other })
             .collect::<Vec<_>>()
     };
-    let mut columns = alone(&own, &other, false);
-    columns.extend(alone(&other, &own, true));
+    let mut columns = alone(&bearer_dofs, &other, false);
+    columns.extend(alone(&other, &bearer_dofs, true));
     columns.sort_by_key(|column| column.dof);
     columns
 }

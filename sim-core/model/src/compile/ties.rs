@@ -124,14 +124,14 @@ pub(super) fn terms(joints: &[(usize, f64)], dof_of: &[usize]) -> Vec<Term<f64>>
 pub(super) fn add_ties(constants: &mut Constants<f64>, all: Vec<DofConstraint>) -> Vec<usize> {
     let mut first = 0;
     let mut constraint_of_tie = Vec::new();
-    for (index, own) in all.into_iter().enumerate() {
+    for (index, dof_constraint) in all.into_iter().enumerate() {
         let DofConstraint {
             measure,
             dofs,
             constraint,
             first_equality,
             safe_references,
-        } = own;
+        } = dof_constraint;
         // as MuJoCo, which leaves out constraints without a Jacobian
         if dofs.is_empty() {
             continue;

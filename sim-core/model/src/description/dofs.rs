@@ -40,8 +40,8 @@ impl Robot {
     pub fn moving_joints(&self) -> Vec<usize> {
         let mut joints_of = vec![Vec::new(); self.links.len()];
         for (index, joint) in self.joints.iter().enumerate() {
-            if let Some(own) = joints_of.get_mut(joint.child) {
-                own.push(index);
+            if let Some(joints) = joints_of.get_mut(joint.child) {
+                joints.push(index);
             }
         }
         self.link_order()

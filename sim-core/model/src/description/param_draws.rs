@@ -138,8 +138,9 @@ impl Description {
                 let models = self.robots.iter();
                 let models = models.filter_map(|robot| Some((robot, robot.precompiled.as_ref()?)));
                 let names = models.flat_map(|(robot, parts)| {
-                    let name =
-                        |own: &str| vec![robot.name.clone(), format!("{}/{own}", robot.name)];
+                    let name = |element: &str| {
+                        vec![robot.name.clone(), format!("{}/{element}", robot.name)]
+                    };
                     let actuators = parts.actuators.iter();
                     actuators
                         .map(move |actuator| name(&actuator.name))

@@ -123,8 +123,8 @@ impl Description {
         let names = self.shape_names();
         let mut pairs = BTreeSet::new();
         for [first, second] in &self.filters {
-            let of = |name| named("contact filter", name, &names);
-            let (first, second) = (of(first)?, of(second)?);
+            let shapes_named = |name| named("contact filter", name, &names);
+            let (first, second) = (shapes_named(first)?, shapes_named(second)?);
             for &a in &first {
                 for &b in second.iter().filter(|&&b| b != a) {
                     pairs.insert([a.min(b), a.max(b)]);

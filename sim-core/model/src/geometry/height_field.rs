@@ -242,8 +242,11 @@ mod tests {
                 volume += dx * dy * (mean - field.bottom);
             }
         }
-        let found = field.surface().signed_volume();
-        assert!((found - volume).abs() < 1e-12 * volume, "{found} {volume}");
+        let enclosed = field.surface().signed_volume();
+        assert!(
+            (enclosed - volume).abs() < 1e-12 * volume,
+            "{enclosed} {volume}"
+        );
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub(super) fn triangles_around_stretched(
 /// The farthest point above each triangle, where there is one.
 fn standing_out(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
     let tolerance = TOLERANCE * size(points);
-    let mut found = Vec::new();
+    let mut vertices = Vec::new();
     for (normal, base) in planes(points, triangles, tolerance) {
         let mut farthest = (tolerance, None);
         for (index, &point) in points.iter().enumerate() {
@@ -77,11 +77,11 @@ fn standing_out(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<u32> {
                 farthest = (height, Some(index as u32));
             }
         }
-        found.extend(farthest.1);
+        vertices.extend(farthest.1);
     }
-    found.sort_unstable();
-    found.dedup();
-    found
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
 }
 
 /// Unit normal of each triangle and a point of it; slivers have no normal to speak of and are left out.

@@ -126,36 +126,36 @@ fn tube(radius: f64, half: f64, p: Vector, d: Vector) -> Met {
 }
 
 fn capsule(radius: f64, half: f64, p: Vector, d: Vector) -> Met {
-    let mut found = tube(radius, half, p, d);
+    let mut nearest = tube(radius, half, p, d);
     for end in [half, -half] {
         let q = [p[0], p[1], p[2] - end];
         let both = roots(dot(d, d), dot(d, q), dot(q, q) - radius * radius);
         for far in both.into_iter().flatten() {
             let beyond = (p[2] + far * d[2]) * end.signum();
             if far >= 0.0 && beyond >= half {
-                found = nearer(found, Some((far, at(q, d, far))));
+                nearest = nearer(nearest, Some((far, at(q, d, far))));
             }
         }
     }
-    found
+    nearest
 }
 
 fn cylinder(radius: f64, half: f64, p: Vector, d: Vector) -> Met {
-    let mut found = None;
+    let mut nearest = None;
     if d[2].abs() > RAY_SMALL {
         for side in [-1.0, 1.0] {
             let far = (side * half - p[2]) / d[2];
             let [x, y, _] = at(p, d, far);
             if far >= 0.0 && x * x + y * y <= radius * radius {
-                found = nearer(found, Some((far, [0.0, 0.0, side])));
+                nearest = nearer(nearest, Some((far, [0.0, 0.0, side])));
             }
         }
     }
-    nearer(found, tube(radius, half, p, d))
+    nearer(nearest, tube(radius, half, p, d))
 }
 
 fn sides(half: [f64; 3], p: Vector, d: Vector) -> Met {
-    let mut found = None;
+    let mut nearest = None;
     for axis in 0..3 {
         if d[axis].abs() <= RAY_SMALL {
             continue;
@@ -167,9 +167,9 @@ fn sides(half: [f64; 3], p: Vector, d: Vector) -> Met {
             if far >= 0.0 && is_within {
                 let mut normal = [0.0; 3];
                 normal[axis] = side;
-                found = nearer(found, Some((far, normal)));
+                nearest = nearer(nearest, Some((far, normal)));
             }
         }
     }
-    found
+    nearest
 }

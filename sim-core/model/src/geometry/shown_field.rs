@@ -244,8 +244,11 @@ mod tests {
         assert_eq!(note, None);
         // 40 of its 100 rows of cells are rough
         assert!(shown.triangles.len() < whole.triangles.len() / 2);
-        let (found, volume) = (shown.signed_volume(), whole.signed_volume());
-        assert!((found - volume).abs() < 1e-9 * volume, "{found} {volume}");
+        let (shown_volume, volume) = (shown.signed_volume(), whole.signed_volume());
+        assert!(
+            (shown_volume - volume).abs() < 1e-9 * volume,
+            "{shown_volume} {volume}"
+        );
         let mut edges: Vec<[u32; 2]> = Vec::new();
         for [a, b, c] in shown.triangles {
             edges.extend([[a, b], [b, c], [c, a]]);

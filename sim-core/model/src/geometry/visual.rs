@@ -122,16 +122,16 @@ impl VisualMesh {
                     continue;
                 };
                 let Material { color, texture } = &run.material;
-                let own = run.colors.get(place).copied();
-                self.colors[next] = own.or(*color);
-                if let Some(found) = texture {
+                let run_color = run.colors.get(place).copied();
+                self.colors[next] = run_color.or(*color);
+                if let Some(textured) = texture {
                     let uv: Option<&Uv> = run.uv.get(place);
-                    let key = (Rc::as_ptr(&found.image), uv.is_some());
+                    let key = (Rc::as_ptr(&textured.image), uv.is_some());
                     let textures_known = self.textures.len();
                     let index = *textures.entry(key).or_insert(textures_known);
                     if index == textures_known {
                         self.textures.push(Texture {
-                            image: (*found.image).clone(),
+                            image: (*textured.image).clone(),
                             triangles: Vec::new(),
                             uv: uv.map(|_| Vec::new()),
                             tints: Vec::new(),
@@ -139,7 +139,7 @@ impl VisualMesh {
                     }
                     let texture = &mut self.textures[index];
                     texture.triangles.push(next as u32);
-                    texture.tints.push(own.unwrap_or(found.tint));
+                    texture.tints.push(run_color.unwrap_or(textured.tint));
                     if let (Some(all), Some(uv)) = (&mut texture.uv, uv) {
                         all.push(*uv);
                     }

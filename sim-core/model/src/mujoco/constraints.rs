@@ -115,7 +115,7 @@ impl Equalities<'_> {
         };
         let [constant, multiplier, c2, c3, c4, ..] = self.data[k];
         let follower = joint(self.firsts[k])?;
-        let own = reference(parts, follower);
+        let offset = reference(parts, follower);
         let mut inverse_weight = weight(parts, follower);
         let (mut second, mut other, mut polynomial) = (Vec::new(), 0.0, [0.0; 5]);
         polynomial[0] = constant;
@@ -130,7 +130,7 @@ impl Equalities<'_> {
             measure: Measure::Lengths {
                 first: vec![(follower, 1.0)],
                 second,
-                offsets: [own, other],
+                offsets: [offset, other],
                 polynomial,
             },
             law: ConstraintLaw::Equality(k),
@@ -146,10 +146,10 @@ impl Equalities<'_> {
         let lengths = self.file.reals("tendon_length0", count)?;
         let weights = self.file.reals("tendon_invweight0", count)?;
         let first = self.tendons.terms(self.file, self.firsts[k])?.to_vec();
-        let own = self.firsts[k] as usize;
+        let first_tendon = self.firsts[k] as usize;
         let [constant, rest @ ..] = self.data[k];
         let mut polynomial = [constant, 0.0, 0.0, 0.0, 0.0];
-        let mut inverse_weight = weights[own];
+        let mut inverse_weight = weights[first_tendon];
         let (mut second, mut other) = (Vec::new(), 0.0);
         if self.seconds[k] >= 0 {
             second = self.tendons.terms(self.file, self.seconds[k])?.to_vec();
@@ -161,7 +161,7 @@ impl Equalities<'_> {
             measure: Measure::Lengths {
                 first,
                 second,
-                offsets: [lengths[own], other],
+                offsets: [lengths[first_tendon], other],
                 polynomial,
             },
             law: ConstraintLaw::Equality(k),
@@ -268,14 +268,14 @@ fn add_limits(
     for (k, &place) in places.iter().enumerate() {
         let joint = &robot.joints[place];
         if joint.kind == JointKind::Ball && limited[k] != 0 {
-            let own = &parts.joints[place];
+            let extras = &parts.joints[place];
             parts.constraints.push(Constraint {
                 measure: Measure::Angle { joint: place },
                 law: ConstraintLaw::Range {
                     bounds: [f64::NEG_INFINITY, ranges[k][0].max(ranges[k][1])],
-                    margin: own.margin,
+                    margin: extras.margin,
                 },
-                softness: own.limit,
+                softness: extras.limit,
                 inverse_weight: along(parts.dof_inverse_weight[dof]),
             });
         }

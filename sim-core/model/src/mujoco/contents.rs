@@ -79,12 +79,12 @@ impl MujocoContents {
         let mocaps = mocaps.iter().zip(&body_names);
         let mocaps = mocaps.filter(|(place, _)| **place >= 0);
         let first = |array: &str| -> Result<String, ModelError> {
-            let found = if file.has(array) {
+            let texts = if file.has(array) {
                 file.texts(array)?
             } else {
                 Vec::new()
             };
-            Ok(found.into_iter().next().unwrap_or_default())
+            Ok(texts.into_iter().next().unwrap_or_default())
         };
         let mut options = Vec::new();
         for option in ["opt.integrator", "opt.solver", "opt.cone"] {
@@ -311,16 +311,16 @@ struct Objects([(&'static str, Vec<String>); 6]);
 
 impl Objects {
     fn read(file: &ModelFile) -> Result<Objects, ModelError> {
-        let of = |kind: &'static str, array: &str| -> Result<_, ModelError> {
+        let names_of_kind = |kind: &'static str, array: &str| -> Result<_, ModelError> {
             Ok((kind, named(file, kind, array)?))
         };
         Ok(Objects([
-            of("body", "body_parentid")?,
-            of("joint", "jnt_type")?,
-            of("geom", "geom_type")?,
-            of("site", "site_bodyid")?,
-            of("tendon", "tendon_num")?,
-            of("actuator", "actuator_trntype")?,
+            names_of_kind("body", "body_parentid")?,
+            names_of_kind("joint", "jnt_type")?,
+            names_of_kind("geom", "geom_type")?,
+            names_of_kind("site", "site_bodyid")?,
+            names_of_kind("tendon", "tendon_num")?,
+            names_of_kind("actuator", "actuator_trntype")?,
         ]))
     }
 

@@ -8,15 +8,15 @@ use crate::geometry::HeightField;
 pub(super) fn height_field(file: &ModelFile, place: i64) -> Result<HeightField, ModelError> {
     let count = file.rows("hfield_nrow");
     let fault = |reason: &str| file.fault(format!("has a height field {reason}"));
-    let own = usize::try_from(place).ok().filter(|&own| own < count);
-    let own = own.ok_or_else(|| fault("that is not there"))?;
+    let row = usize::try_from(place).ok().filter(|&row| row < count);
+    let row = row.ok_or_else(|| fault("that is not there"))?;
     let number = |array: &str| -> Result<usize, ModelError> {
         let all = file.integers(array, count)?;
-        usize::try_from(all[own]).map_err(|_| fault("of a negative size"))
+        usize::try_from(all[row]).map_err(|_| fault("of a negative size"))
     };
     let (rows, columns) = (number("hfield_nrow")?, number("hfield_ncol")?);
     let first = number("hfield_adr")?;
-    let [x, y, height, base] = file.vectors::<4>("hfield_size", count)?[own];
+    let [x, y, height, base] = file.vectors::<4>("hfield_size", count)?[row];
     let all = file.reals("hfield_data", file.rows("hfield_data"))?;
     let data = rows.checked_mul(columns).and_then(|count| {
         let end = first.checked_add(count)?;

@@ -102,10 +102,10 @@ impl ModelFile {
         let Some((shape, entries)) = self.arrays.get(name) else {
             return Err(self.fault(format!("lacks the array `{name}`; save the scene again")));
         };
-        let found: usize = shape.iter().product();
-        if found != count {
+        let size: usize = shape.iter().product();
+        if size != count {
             return Err(self.fault(format!(
-                "array `{name}` has {found} entries instead of {count}"
+                "array `{name}` has {size} entries instead of {count}"
             )));
         }
         Ok(entries)
@@ -244,8 +244,8 @@ impl ModelFile {
         }
         let text = self.texts("mujoco_version")?.concat();
         let mut parts = text.split('.').map(|part| part.parse().unwrap_or(0));
-        let own: [u32; 2] = std::array::from_fn(|_| parts.next().unwrap_or(0));
-        Ok(own >= version)
+        let file_version: [u32; 2] = std::array::from_fn(|_| parts.next().unwrap_or(0));
+        Ok(file_version >= version)
     }
 
     /// An array of enumerators, by the names that MuJoCo gives them.
@@ -253,8 +253,8 @@ impl ModelFile {
         let known = self.texts(&format!("{name}.names"))?;
         let kinds = self.integers(name, count)?.into_iter().map(|kind| {
             let place = usize::try_from(kind).ok();
-            let found = place.and_then(|place| known.get(place));
-            found
+            let known_kind = place.and_then(|place| known.get(place));
+            known_kind
                 .cloned()
                 .ok_or_else(|| self.fault(format!("array `{name}` has the unknown kind {kind}")))
         });

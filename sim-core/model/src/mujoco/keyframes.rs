@@ -15,8 +15,8 @@ pub(super) fn keyframes(file: &ModelFile) -> Result<Vec<Keyframe>, ModelError> {
             let name = &names[place / width];
             return Err(file.fault(format!("has an infinite number in keyframe `{name}`")));
         }
-        let of = |k: usize| all[k * width..(k + 1) * width].to_vec();
-        Ok::<_, ModelError>((0..count).map(of).collect::<Vec<_>>())
+        let row = |k: usize| all[k * width..(k + 1) * width].to_vec();
+        Ok::<_, ModelError>((0..count).map(row).collect::<Vec<_>>())
     };
     let actuators = file.rows("actuator_trntype");
     let states = file.integers("actuator_actnum", actuators)?;

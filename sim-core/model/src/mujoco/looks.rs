@@ -93,14 +93,14 @@ fn colors(file: &ModelFile, count: usize) -> Result<Vec<[f64; 4]>, ModelError> {
     let of_materials = file.vectors::<4>("mat_rgba", materials)?;
     let textures = file.vectors::<3>("mat_texture_mean", materials)?;
     let chosen = file.indices("geom_matid", count, materials)?;
-    let own = file.vectors::<4>("geom_rgba", count)?;
-    let all = own.into_iter().zip(chosen).map(|(own, material)| {
+    let rgba = file.vectors::<4>("geom_rgba", count)?;
+    let all = rgba.into_iter().zip(chosen).map(|(rgba, material)| {
         let Some(material) = material else {
-            return own;
+            return rgba;
         };
-        let [red, green, blue, opacity] = match own == NO_COLOR {
+        let [red, green, blue, opacity] = match rgba == NO_COLOR {
             true => of_materials[material],
-            false => own,
+            false => rgba,
         };
         let texture = textures[material];
         [

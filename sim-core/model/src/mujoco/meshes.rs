@@ -49,14 +49,15 @@ fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelEr
     let counts = file.integers_or("mesh_polyvertnum", rows, 0)?;
     let mut all = Vec::with_capacity(rows);
     for (polygon, (&first, &count)) in firsts.iter().zip(&counts).enumerate() {
-        let own = parts(first, count).and_then(|part| corners.get(part));
-        let own = own.and_then(|own| {
-            own.iter()
+        let listed = parts(first, count).and_then(|part| corners.get(part));
+        let indices = listed.and_then(|listed| {
+            listed
+                .iter()
                 .map(|&corner| u32::try_from(corner).ok())
                 .collect()
         });
         all.push(Polygon {
-            corners: own.ok_or_else(beyond)?,
+            corners: indices.ok_or_else(beyond)?,
             normal: normals[polygon],
         });
     }
@@ -186,9 +187,9 @@ impl<'a> Meshes<'a> {
             },
         )?;
         let is_whole = (1..=most).contains(&hull.len());
-        let whole = |own: Hull| match is_whole && !own.flat {
-            true => as_mujoco(own, &points, &corners, &self.polygons[place]),
-            false => own,
+        let whole = |computed: Hull| match is_whole && !computed.flat {
+            true => as_mujoco(computed, &points, &corners, &self.polygons[place]),
+            false => computed,
         };
         mesh.hulls = mesh.hulls.into_iter().map(whole).collect();
         Ok(Shape::Mesh(Arc::new(mesh)))

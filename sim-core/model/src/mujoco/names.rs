@@ -5,15 +5,15 @@ use crate::error::ModelError;
 
 /// Names of all elements of a kind, `body`, `joint`, `geom`, `actuator`, …; `count` of them.
 pub(super) fn names(file: &ModelFile, kind: &str, count: usize) -> Result<Vec<String>, ModelError> {
-    let found = file.texts(&format!("names.{kind}"))?;
-    if found.len() != count {
+    let texts = file.texts(&format!("names.{kind}"))?;
+    if texts.len() != count {
         return Err(file.fault(format!(
             "has {} names of kind `{kind}` instead of {count}",
-            found.len()
+            texts.len()
         )));
     }
-    let taken: std::collections::HashSet<String> = found.iter().cloned().collect();
-    let named = found.into_iter().enumerate().map(|(index, name)| {
+    let taken: std::collections::HashSet<String> = texts.iter().cloned().collect();
+    let named = texts.into_iter().enumerate().map(|(index, name)| {
         if !name.is_empty() {
             return name;
         }

@@ -78,7 +78,7 @@ pub(super) fn add_pairs(
 }
 
 /// Pairs that contacts of ours cannot express.
-pub(super) fn refuse(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+pub(super) fn refuse(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let pairs = geoms(file, file.rows("geom_type"))?;
     let is_off = has_flag(file, "mjDSBL_CONTACT")? || has_flag(file, "mjDSBL_CONSTRAINT")?;
     if pairs.is_empty() || is_off {
@@ -111,8 +111,8 @@ pub(super) fn refuse(file: &ModelFile, found: &mut Vec<String>) -> Result<(), Mo
             ),
         ];
         let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
-        found.extend(wrong.map(|(_, what)| no("pair", name, what)));
-        refuse_power(found, "pair", name, &solimps[k]);
+        refused.extend(wrong.map(|(_, what)| no("pair", name, what)));
+        refuse_power(refused, "pair", name, &solimps[k]);
     }
     Ok(())
 }

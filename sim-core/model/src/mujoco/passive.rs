@@ -72,7 +72,7 @@ pub(super) fn compensators(
 ) -> Result<Vec<Compensator>, ModelError> {
     let acts = file.rows("actuator_trntype") > 0 && !has_flag(file, "mjDSBL_ACTUATION")?;
     let of_actuators = file.integers("jnt_actgravcomp", joints)?;
-    let kinds = of_actuators.into_iter().map(|own| match (own, acts) {
+    let kinds = of_actuators.into_iter().map(|flag| match (flag, acts) {
         (0, _) => Compensator::Passive,
         (_, true) => Compensator::Actuators,
         (_, false) => Compensator::Nothing,

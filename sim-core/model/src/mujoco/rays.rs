@@ -90,6 +90,6 @@ pub(super) fn visible(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
     let of_materials = file.vectors::<4>("mat_rgba", materials)?;
     let materials = file.indices("geom_matid", count, materials)?;
     let both = colors.iter().zip(materials);
-    let color = both.map(|(own, material)| material.map_or(own, |place| &of_materials[place]));
+    let color = both.map(|(rgba, material)| material.map_or(rgba, |place| &of_materials[place]));
     Ok(color.map(|color| color[3] != 0.0).collect())
 }

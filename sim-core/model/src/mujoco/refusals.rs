@@ -69,24 +69,24 @@ pub(super) fn listed(reasons: &[String]) -> String {
 /// # Errors
 /// A file that lacks arrays.
 pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
-    let mut found = Vec::new();
+    let mut refused = Vec::new();
     if let Some((_, array, _)) = MUST_BE_ZERO.iter().find(|(_, array, _)| !file.has(array)) {
         return Err(file.fault(format!("lacks the array `{array}`; save the scene again")));
     }
     for (kind, array, feature) in MUST_BE_ZERO.iter().chain(NEWER_MUST_BE_ZERO) {
         if let Some(row) = file.first_set(array) {
             let names = names(file, kind, file.rows(array))?;
-            found.push(no(kind, &names[row], feature));
+            refused.push(no(kind, &names[row], feature));
         }
     }
-    options(file, &mut found)?;
-    joints(file, &mut found)?;
-    geoms(file, &mut found)?;
-    pairs::refuse(file, &mut found)?;
-    equalities(file, &mut found)?;
-    tendons(file, &mut found)?;
-    actuators(file, &mut found)?;
-    Ok(found)
+    options(file, &mut refused)?;
+    joints(file, &mut refused)?;
+    geoms(file, &mut refused)?;
+    pairs::refuse(file, &mut refused)?;
+    equalities(file, &mut refused)?;
+    tendons(file, &mut refused)?;
+    actuators(file, &mut refused)?;
+    Ok(refused)
 }
 
 /// A sentence about an element.
@@ -94,32 +94,32 @@ pub(super) fn no(kind: &str, name: &str, feature: &str) -> String {
     format!("{kind} `{name}`: no support for {feature}")
 }
 
-fn options(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn options(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     for flag in file.texts("opt.flags")? {
         if !FLAGS.contains(&flag.as_str()) {
-            found.push(no("option", "flag", &flag));
+            refused.push(no("option", "flag", &flag));
         }
     }
     let integrator = file.texts("opt.integrator")?;
     match integrator.first().map(String::as_str) {
         Some("mjINT_EULER" | "mjINT_IMPLICITFAST" | "mjINT_RK4") => {}
-        other => found.push(format!(
+        other => refused.push(format!(
             "option `integrator`: no support for {}, use Euler, implicitfast or RK4",
             other.unwrap_or("none")
         )),
     }
     if file.integer("opt.noslip_iterations")? > 0 {
-        found.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
+        refused.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
     }
     for (counted, what) in [("nflex", "flexes"), ("nplugin", "plugins")] {
         if file.integer(counted)? > 0 {
-            found.push(format!("model: no support for {what}"));
+            refused.push(format!("model: no support for {what}"));
         }
     }
     Ok(())
 }
 
-fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn joints(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let joints = file.rows("jnt_type");
     let names = names(file, "joint", joints)?;
     let kinds = file.kinds("jnt_type", joints)?;
@@ -137,28 +137,28 @@ fn joints(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
             _ => (1, "a joint"),
         };
         let first = usize::try_from(firsts[joint]).unwrap_or(dofs).min(dofs);
-        let own = first..(first + count).min(dofs);
+        let joint_dofs = first..(first + count).min(dofs);
         let wrong = [
             (
                 count > 1 && bounded[joint] != 0,
                 "bounds of actuator forces",
             ),
             (
-                curved.is_some_and(|dof| own.contains(&dof)),
+                curved.is_some_and(|dof| joint_dofs.contains(&dof)),
                 "nonlinear damping",
             ),
         ];
         let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
-        found.extend(wrong.map(|(_, what)| no("joint", name, &format!("{what} of {kind}"))));
-        let softness = std::iter::once(&limits[joint]).chain(&frictions[own.clone()]);
+        refused.extend(wrong.map(|(_, what)| no("joint", name, &format!("{what} of {kind}"))));
+        let softness = std::iter::once(&limits[joint]).chain(&frictions[joint_dofs.clone()]);
         for solimp in softness {
-            refuse_power(found, "joint", name, solimp);
+            refuse_power(refused, "joint", name, solimp);
         }
     }
     Ok(())
 }
 
-fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn geoms(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("geom_type");
     let names = names(file, "geom", count)?;
     let kinds = file.kinds("geom_type", count)?;
@@ -183,24 +183,24 @@ fn geoms(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
             "mjGEOM_PLANE" if moves => Some("planes on bodies that move"),
             _ => None,
         };
-        found.extend(shape.map(|shape| no("geom", name, shape)));
+        refused.extend(shape.map(|shape| no("geom", name, shape)));
         if !matches!(condims[geom], 1 | 3 | 4 | 6) {
-            found.push(no("geom", name, &format!("condim {}", condims[geom])));
+            refused.push(no("geom", name, &format!("condim {}", condims[geom])));
         }
-        refuse_power(found, "geom", name, &solimps[geom]);
+        refuse_power(refused, "geom", name, &solimps[geom]);
     }
     Ok(())
 }
 
-pub(super) fn refuse_power(found: &mut Vec<String>, kind: &str, name: &str, solimp: &[f64; 5]) {
+pub(super) fn refuse_power(refused: &mut Vec<String>, kind: &str, name: &str, solimp: &[f64; 5]) {
     let power = solimp[4];
     if power > POWER_MAX {
         let most = format!("a solimp with the power {power}, above {POWER_MAX}");
-        found.push(no(kind, name, &most));
+        refused.push(no(kind, name, &most));
     }
 }
 
-fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn equalities(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     if has_flag(file, "mjDSBL_EQUALITY")? || has_flag(file, "mjDSBL_CONSTRAINT")? {
         return Ok(());
     }
@@ -214,25 +214,25 @@ fn equalities(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelErro
             "mjEQ_DISTANCE" => Some("distance"),
             _ => Some("equalities of flexes"),
         };
-        found.extend(problem.map(|problem| no("equality", &names[k], problem)));
-        refuse_power(found, "equality", &names[k], &solimps[k]);
+        refused.extend(problem.map(|problem| no("equality", &names[k], problem)));
+        refuse_power(refused, "equality", &names[k], &solimps[k]);
     }
     Ok(())
 }
 
-fn tendons(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("tendon_num");
     let names = names(file, "tendon", count)?;
     let spatial = spatial_tendons(file)?;
     for tendon in (0..count).filter(|&tendon| spatial[tendon]) {
         if acts(file, tendon, count)? {
-            found.push(no("tendon", &names[tendon], "spatial tendons"));
+            refused.push(no("tendon", &names[tendon], "spatial tendons"));
         }
     }
     for which in ["lim", "fri"] {
         let solimps = file.vectors::<5>(&format!("tendon_solimp_{which}"), count)?;
         for (name, solimp) in names.iter().zip(&solimps) {
-            refuse_power(found, "tendon", name, solimp);
+            refuse_power(refused, "tendon", name, solimp);
         }
     }
     Ok(())
@@ -246,8 +246,8 @@ pub(super) fn spatial_tendons(file: &ModelFile) -> Result<Vec<bool>, ModelError>
     let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
     let spatial = firsts.into_iter().zip(counts).map(|(first, count)| {
         let end = first.saturating_add(count).max(0) as usize;
-        let own = kinds.get(first.max(0) as usize..end).unwrap_or_default();
-        own.iter().any(|kind| kind != "mjWRAP_JOINT")
+        let wraps = kinds.get(first.max(0) as usize..end).unwrap_or_default();
+        wraps.iter().any(|kind| kind != "mjWRAP_JOINT")
     });
     Ok(spatial.collect())
 }
@@ -287,7 +287,7 @@ fn acts(file: &ModelFile, tendon: usize, count: usize) -> Result<bool, ModelErro
     )
 }
 
-fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError> {
+fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("actuator_trntype");
     let names = names(file, "actuator", count)?;
     let transmissions = file.kinds("actuator_trntype", count)?;
@@ -317,11 +317,12 @@ fn actuators(file: &ModelFile, found: &mut Vec<String>) -> Result<(), ModelError
             (dynamics, ..) => Some(dynamics),
         };
         let name = &names[k];
-        found.extend(transmission.map(|to| no("actuator", name, &format!("transmission to {to}"))));
-        found.extend(law.map(|law| no("actuator", name, law)));
+        refused
+            .extend(transmission.map(|to| no("actuator", name, &format!("transmission to {to}"))));
+        refused.extend(law.map(|law| no("actuator", name, law)));
         if controls[k] != 1 || outputs[k] != 1 || states[k] > 1 {
             let several = "several controls, outputs or activations";
-            found.push(no("actuator", name, several));
+            refused.push(no("actuator", name, several));
         }
     }
     Ok(())

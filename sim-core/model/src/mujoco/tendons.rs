@@ -26,14 +26,14 @@ impl Tendons {
         let names = names(file, "tendon", count)?;
         let terms = (0..count).map(|k| {
             let first = firsts[k].max(0) as usize;
-            let own = first..first.saturating_add(counts[k].max(0) as usize);
+            let wraps = first..first.saturating_add(counts[k].max(0) as usize);
             let fault = || file.fault(format!("has no joints for tendon `{}`", names[k]));
-            let own_kinds = kinds.get(own.clone()).ok_or_else(fault)?;
+            let own_kinds = kinds.get(wraps.clone()).ok_or_else(fault)?;
             if own_kinds.iter().any(|kind| kind != "mjWRAP_JOINT") {
                 return Ok(None);
             }
             let mut terms: Vec<(usize, f64)> = Vec::new();
-            for wrap in own {
+            for wrap in wraps {
                 let joint = usize::try_from(joints[wrap]).ok();
                 let place = joint.and_then(|joint| places.get(joint)).copied();
                 let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
@@ -57,8 +57,8 @@ impl Tendons {
     /// No such tendon, or a spatial one.
     pub fn terms(&self, file: &ModelFile, tendon: i64) -> Result<&[(usize, f64)], ModelError> {
         let place = usize::try_from(tendon).ok();
-        let found = place.and_then(|place| self.terms.get(place)?.as_deref());
-        found.ok_or_else(|| file.fault(format!("has no fixed tendon {tendon}")))
+        let terms = place.and_then(|place| self.terms.get(place)?.as_deref());
+        terms.ok_or_else(|| file.fault(format!("has no fixed tendon {tendon}")))
     }
 }
 
@@ -75,13 +75,13 @@ pub(super) fn bounds(file: &ModelFile) -> Result<Vec<Bound>, ModelError> {
     let ranges = file.vectors::<2>("tendon_actfrcrange", count)?;
     let kinds = file.kinds("actuator_trntype", actuators)?;
     let targets = file.vectors_of_integers::<2>("actuator_trnid", actuators)?;
-    let own = |tendon: usize| {
+    let actuators_of = |tendon: usize| {
         let is_own = |&k: &usize| kinds[k] == "mjTRN_TENDON" && targets[k][0] == tendon as i64;
         (0..actuators).filter(is_own).collect::<Vec<usize>>()
     };
     let limited = (0..count).filter(|&tendon| limited[tendon] != 0);
-    let bounds = limited.map(|tendon| (own(tendon), ranges[tendon]));
-    Ok(bounds.filter(|(own, _)| !own.is_empty()).collect())
+    let bounds = limited.map(|tendon| (actuators_of(tendon), ranges[tendon]));
+    Ok(bounds.filter(|(acting, _)| !acting.is_empty()).collect())
 }
 
 /// Where MuJoCo's joints are among the robot's.
@@ -90,11 +90,11 @@ pub(super) fn moving(
     joints: usize,
     file: &ModelFile,
 ) -> Result<Vec<usize>, ModelError> {
-    let found: Vec<usize> = (0..robot.joints.len())
+    let moving: Vec<usize> = (0..robot.joints.len())
         .filter(|&joint| robot.joints[joint].moves())
         .collect();
-    match found.len() == joints {
-        true => Ok(found),
+    match moving.len() == joints {
+        true => Ok(moving),
         false => Err(file.fault("has joints without bodies".to_owned())),
     }
 }

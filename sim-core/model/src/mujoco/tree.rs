@@ -236,14 +236,14 @@ fn add_joints(
     let turns = file.vectors::<4>("body_quat", bodies)?;
     let all = JointArrays::read(file)?;
     for body in 1..bodies {
-        let own: Vec<usize> = (0..all.kinds.len())
+        let joints: Vec<usize> = (0..all.kinds.len())
             .filter(|&joint| all.bodies[joint] == Some(body))
             .collect();
         let origin = frame(places[body], turns[body]);
-        if own.is_empty() {
+        if joints.is_empty() {
             let taken = |name: &String| all.names.contains(name);
-            let own = (1..).map(|count| format!("{} (fixed{count})", robot.links[body].name));
-            let name = own
+            let names = (1..).map(|count| format!("{} (fixed{count})", robot.links[body].name));
+            let name = names
                 .into_iter()
                 .find(|name| !taken(name))
                 .unwrap_or_default();
@@ -252,8 +252,9 @@ fn add_joints(
             robot.joints.push(joint);
             parts.joints.push(JointExtras::default());
         }
-        for (place, joint) in own.into_iter().enumerate() {
-            let (mut joint, mut own) = all.joint(file, joint, body, parents[body].unwrap_or(0))?;
+        for (place, joint) in joints.into_iter().enumerate() {
+            let (mut joint, mut extras) =
+                all.joint(file, joint, body, parents[body].unwrap_or(0))?;
             if place == 0 {
                 joint.origin = origin;
             }
@@ -265,10 +266,10 @@ fn add_joints(
                 });
                 joint.q[..3].copy_from_slice(&start.pos);
                 joint.q[3..].copy_from_slice(&start.quat);
-                own.spring_pose = options.pose.mul(&own.spring_pose);
+                extras.spring_pose = options.pose.mul(&extras.spring_pose);
             }
             robot.joints.push(joint);
-            parts.joints.push(own);
+            parts.joints.push(extras);
         }
     }
     Ok(())
@@ -311,7 +312,7 @@ impl JointArrays {
             })
             .collect();
         let is_scalar = dofs == 1;
-        let own = JointExtras {
+        let extras = JointExtras {
             anchor: if kind == JointKind::Free {
                 [0.0; 3]
             } else {
@@ -331,7 +332,7 @@ impl JointArrays {
             friction: self.frictions[dof],
             actuator_range: (self.is_bounded[k] != 0).then_some(self.bounds[k]),
         };
-        Ok((joint, own))
+        Ok((joint, extras))
     }
 }
 

@@ -83,8 +83,8 @@ pub(super) fn meant(element: &str, name: &str, known: &[&'static str]) -> Option
     let synonym = SYNONYMS
         .iter()
         .find(|(place, other, _)| *place == element && *other == name);
-    if let Some((_, _, own)) = synonym {
-        return known.iter().copied().find(|known| known == own);
+    if let Some((_, _, standard)) = synonym {
+        return known.iter().copied().find(|known| known == standard);
     }
     let likeness = |known: &&str| strsim::jaro_winkler(&name, known);
     let is_longer = |known: &&str| {

@@ -122,13 +122,13 @@ impl<'a, 'input> Scan<'a, 'input> {
         let mut first: Vec<Option<Node>> = vec![None; tag.children.len()];
         for child in node.children().filter(Node::is_element) {
             // a prefix makes it another vocabulary's element, such as xacro's
-            let own = child.tag_name().namespace() == node.tag_name().namespace();
+            let has_same_namespace = child.tag_name().namespace() == node.tag_name().namespace();
             let known = tag
                 .children
                 .iter()
-                .position(|(known, _)| own && known.name == child.tag_name().name());
+                .position(|(known, _)| has_same_namespace && known.name == child.tag_name().name());
             let Some(place) = known else {
-                self.unknown(node, child, own, tag)?;
+                self.unknown(node, child, has_same_namespace, tag)?;
                 continue;
             };
             let (known, count) = tag.children[place];
@@ -151,8 +151,8 @@ impl<'a, 'input> Scan<'a, 'input> {
                 }
             }
         }
-        for ((known, count), found) in tag.children.iter().zip(&first) {
-            if *count == Count::One && found.is_none() {
+        for ((known, count), seen) in tag.children.iter().zip(&first) {
+            if *count == Count::One && seen.is_none() {
                 let reason = format!("<{}> is missing; add it", known.name);
                 return Err(self.fault(node, reason));
             }
@@ -178,7 +178,7 @@ impl<'a, 'input> Scan<'a, 'input> {
             ("the number of collisions", self.collisions, SHAPES_MAX),
             ("the number of visuals", self.visuals, SHAPES_MAX),
         ];
-        match limits.iter().find(|(_, found, most)| found > most) {
+        match limits.iter().find(|(_, count, most)| count > most) {
             Some((what, _, most)) => Err(ModelError::TooLarge {
                 path: self.path.to_owned(),
                 what,
@@ -189,15 +189,15 @@ impl<'a, 'input> Scan<'a, 'input> {
     }
 
     /// Refuses a geometry that is not one shape.
-    fn shapes(&self, node: Node, found: usize) -> Result<(), ModelError> {
-        if found == 1 {
+    fn shapes(&self, node: Node, count: usize) -> Result<(), ModelError> {
+        if count == 1 {
             return Ok(());
         }
         let cure = "give one <box>, <sphere>, <cylinder>, <capsule> or <mesh>";
         let unknown = node.children().find(Node::is_element);
-        let reason = match unknown.filter(|_| found == 0) {
+        let reason = match unknown.filter(|_| count == 0) {
             Some(shape) => format!("<{}> is no shape that is known; {cure}", name_of(shape)),
-            None => format!("{found} shapes; {cure}"),
+            None => format!("{count} shapes; {cure}"),
         };
         Err(self.fault(node, reason))
     }
@@ -207,30 +207,32 @@ impl<'a, 'input> Scan<'a, 'input> {
         &mut self,
         parent: Node<'a, 'input>,
         child: Node<'a, 'input>,
-        own: bool,
+        has_same_namespace: bool,
         tag: &'static Tag,
     ) -> Result<(), ModelError> {
         let name = child.tag_name().name();
-        if !own && is_xacro(child) {
+        if !has_same_namespace && is_xacro(child) {
             let left = self.xacro.leftover(child);
             let what = left.map_err(|reason| self.fault(child, reason))?;
             self.ignore(child, what);
             return Ok(());
         }
-        if name == "include" && !own {
+        if name == "include" && !has_same_namespace {
             let reason = "is not followed; write what it includes into this file";
             return Err(self.fault(child, reason.to_owned()));
         }
         let place = PLACES
             .iter()
             .find(|(known, _)| known.eq_ignore_ascii_case(name));
-        let Some((known, place)) = place.filter(|_| own) else {
+        let Some((known, place)) = place.filter(|_| has_same_namespace) else {
             let what = format!("<{}>", name_of(child));
             let absent = tag.children.iter().filter(|(known, count)| {
                 *count == Count::Any || children(parent, known.name).next().is_none()
             });
             let absent: Vec<&str> = absent.map(|(known, _)| known.name).collect();
-            if let Some(meant) = mistakes::meant(tag.name, name, &absent).filter(|_| own) {
+            if let Some(meant) =
+                mistakes::meant(tag.name, name, &absent).filter(|_| has_same_namespace)
+            {
                 let (document, meant) = (self.document, format!("<{meant}>"));
                 self.mistakes
                     .misspelt(&what, || line_of(document, child), &meant);

@@ -122,7 +122,7 @@ fn numbers<'a>(
         }
     }
     match (parsed.len(), count) {
-        (found, count) if found == count => {}
+        (given, count) if given == count => {}
         (0, _) => {
             let name = attribute.name;
             return Err(format!(
@@ -133,13 +133,13 @@ fn numbers<'a>(
                 }
             ));
         }
-        (found, count) if found > count => {
+        (given, count) if given > count => {
             return refuse("too many numbers", &format!("give {shape}"));
         }
-        (found, _) => {
-            let plural = if found == 1 { "" } else { "s" };
+        (given, _) => {
+            let plural = if given == 1 { "" } else { "s" };
             return refuse(
-                &format!("only {found} number{plural}"),
+                &format!("only {given} number{plural}"),
                 &format!("give {shape}"),
             );
         }

@@ -92,13 +92,13 @@ impl Looks<'_> {
         if self.named.contains_key(name) {
             return;
         }
-        if let Some(material) = self.own(node) {
+        if let Some(material) = self.material(node) {
             self.named.insert(name.to_owned(), material);
         }
     }
 
     /// What a `<material>` says itself, if anything.
-    fn own(&mut self, node: Node) -> Option<Material> {
+    fn material(&mut self, node: Node) -> Option<Material> {
         let color = children(node, "color").find_map(|color| color.attribute("rgba"));
         let texture = children(node, "texture").find_map(|texture| texture.attribute("filename"));
         if color.is_none() && texture.is_none() {
@@ -127,7 +127,8 @@ impl Looks<'_> {
         let material = children(node, "material").next();
         let material = material.and_then(|material| {
             let name = material.attribute("name").unwrap_or_default();
-            self.own(material).or_else(|| self.named.get(name).cloned())
+            self.material(material)
+                .or_else(|| self.named.get(name).cloned())
         });
         let Material { color, texture } = material.unwrap_or_default();
         let (pose, look) = match self
@@ -176,7 +177,7 @@ impl Looks<'_> {
         let Some((shape, tag)) = known else {
             return Err(format!("it has no shape that is known; {cure}"));
         };
-        let size = |name| one(tag, shape, name);
+        let size = |name| number(tag, shape, name);
         let half = |name| size(name).map(|length| 0.5 * length);
         Ok(Look::Shape(match tag.name {
             "box" => Shape::Box {
@@ -260,6 +261,6 @@ fn required<const N: usize>(tag: &Tag, node: Node, name: &str) -> Result<[f64; N
     numbers(tag, node, name)?.ok_or_else(missing)
 }
 
-fn one(tag: &Tag, node: Node, name: &str) -> Result<f64, String> {
+fn number(tag: &Tag, node: Node, name: &str) -> Result<f64, String> {
     required::<1>(tag, node, name).map(|[number]| number)
 }

@@ -113,7 +113,7 @@ pub(super) fn has(node: Node, child: &'static str, attribute: &str) -> bool {
 }
 
 /// Whether two elements say the same: the same attributes, and nothing inside.
-pub(super) fn same(one: Node, other: Node) -> bool {
+pub(super) fn same(first: Node, other: Node) -> bool {
     let attributes = |node: Node| -> Vec<(String, String)> {
         let mut all: Vec<_> = node
             .attributes()
@@ -123,12 +123,12 @@ pub(super) fn same(one: Node, other: Node) -> bool {
         all
     };
     let is_leaf = |node: Node| !node.children().any(|child| child.is_element());
-    is_leaf(one) && is_leaf(other) && attributes(one) == attributes(other)
+    is_leaf(first) && is_leaf(other) && attributes(first) == attributes(other)
 }
 
 /// Such as ``<limit> of joint `elbow` ``.
 pub(super) fn describe(node: Node) -> String {
-    let own = format!("<{}>", name_of(node));
+    let element = format!("<{}>", name_of(node));
     for ancestor in node.ancestors() {
         let kind = ancestor.tag_name().name();
         if let Some(name) = ancestor
@@ -137,13 +137,13 @@ pub(super) fn describe(node: Node) -> String {
         {
             let name = short(name);
             return if ancestor == node {
-                format!("{own} `{name}`")
+                format!("{element} `{name}`")
             } else {
-                format!("{own} of {kind} `{name}`")
+                format!("{element} of {kind} `{name}`")
             };
         }
     }
-    own
+    element
 }
 
 /// The element's name with the prefix it is written with.

@@ -195,8 +195,8 @@ fn collada_nodes_nest_turn_mirror_and_repeat() {
         <instance_geometry url=\"#mesh\"/></node></node>";
     let mesh = load(nested);
     let body = unit_density(&mesh);
-    for (found, expected) in body.pos.iter().zip([9.5, 1.0, 0.25]) {
-        assert!((found - expected).abs() < 1e-12, "{body:?}");
+    for (actual, expected) in body.pos.iter().zip([9.5, 1.0, 0.25]) {
+        assert!((actual - expected).abs() < 1e-12, "{body:?}");
     }
     assert!((body.mass - 8.0 * 0.125).abs() < 1e-12);
     // the same as one matrix, by rows
@@ -226,8 +226,8 @@ fn gltf_nodes_nest_and_mirror() {
         .unwrap();
     let body = unit_density(&loaded);
     // in the file at (1 - 2 0.5, 2 + 0.25, 3 + 0.125), y up
-    for (found, expected) in body.pos.iter().zip([0.0, -3.125, 2.25]) {
-        assert!((found - expected).abs() < 1e-12, "{body:?}");
+    for (actual, expected) in body.pos.iter().zip([0.0, -3.125, 2.25]) {
+        assert!((actual - expected).abs() < 1e-12, "{body:?}");
     }
     assert!((body.mass - 0.25).abs() < 1e-13 && loaded.triangles.signed_volume() > 0.0);
 }

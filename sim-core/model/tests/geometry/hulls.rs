@@ -166,18 +166,18 @@ fn hulls_of_random_clouds_are_parrys() {
     };
     for count in [5, 20, 100, 1000] {
         let points: Vec<[f64; 3]> = (0..count).map(|_| [random(), random(), random()]).collect();
-        let theirs: Vec<Point> = points
+        let cloud: Vec<Point> = points
             .iter()
             .map(|&[x, y, z]| Point::new(x, y, z))
             .collect();
-        let (vertices, triangles) = try_convex_hull(&theirs).unwrap();
-        let theirs = TriMesh {
+        let (vertices, triangles) = try_convex_hull(&cloud).unwrap();
+        let expected = TriMesh {
             vertices: vertices.iter().map(|p| [p.x, p.y, p.z]).collect(),
             triangles,
         };
-        let ours = hull(&points);
-        let share = ours.volume() / theirs.signed_volume();
-        assert_eq!(ours.vertices.len(), theirs.vertices.len());
+        let actual = hull(&points);
+        let share = actual.volume() / expected.signed_volume();
+        assert_eq!(actual.vertices.len(), expected.vertices.len());
         // faces are planes to 1e-5 of the size only, over an area of some six times its square
         assert!((share - 1.0).abs() < 1e-4, "{share}");
     }

@@ -121,10 +121,10 @@ fn a_damaged_file_is_made_again() {
 fn a_buffer_beside_a_gltf_file_is_part_of_it() {
     let folder = keeping("kept-beside");
     let text = |mesh: &TriMesh| gltf(mesh, "\"uri\":\"balls.bin\",", r#"{"mesh":0}"#);
-    let (one, other) = (balls(0.1), balls(0.2));
-    assert_eq!(text(&one).len(), text(&other).len());
-    let path = folder.put("balls.gltf", text(&one));
-    folder.put("balls.bin", gltf_buffer(&one));
+    let (small, other) = (balls(0.1), balls(0.2));
+    assert_eq!(text(&small).len(), text(&other).len());
+    let path = folder.put("balls.gltf", text(&small));
+    folder.put("balls.bin", gltf_buffer(&small));
     let first = load(&path);
     assert_eq!((load(&path), kept(&folder).len()), (first.clone(), 1));
     folder.put("balls.bin", gltf_buffer(&other));

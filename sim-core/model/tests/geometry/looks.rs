@@ -213,7 +213,7 @@ fn collada_materials_have_colour_and_opacity() {
     for (shader, color) in cases {
         let seen = see(&shader);
         assert!(
-            seen.colors.iter().all(|found| *found == color),
+            seen.colors.iter().all(|actual| *actual == color),
             "{shader}: {:?}",
             seen.colors
         );
@@ -257,7 +257,7 @@ fn each_instance_of_a_geometry_has_its_own_material() {
         .chunks(12)
         .zip([Some(RED), Some(GREEN), None, None])
     {
-        assert!(color.iter().all(|found| *found == expected));
+        assert!(color.iter().all(|actual| *actual == expected));
     }
     assert_eq!(seen.notes.len(), 1);
 }
@@ -285,16 +285,16 @@ fn images_of_a_collada_file_are_found_by_any_of_their_ways() {
             )
             .replace("<node>", "<node><scale>1 1 -1</scale>");
         let seen = look(&folder.put("a.dae", text));
-        let [found] = &seen.textures[..] else {
+        let [texture] = &seen.textures[..] else {
             panic!()
         };
         assert_eq!(
-            file_of(&found.image),
+            file_of(&texture.image),
             folder.as_ref().join("../skins/a b.png")
         );
-        assert_eq!(found.tints, [[255; 4]; 12]);
+        assert_eq!(texture.tints, [[255; 4]; 12]);
         assert!(seen.colors.iter().all(Option::is_none));
-        for (triangle, uv) in found.triangles.iter().zip(found.uv.as_ref().unwrap()) {
+        for (triangle, uv) in texture.triangles.iter().zip(texture.uv.as_ref().unwrap()) {
             let corners = seen.triangles[*triangle as usize];
             let places = corners.map(|corner| seen.vertices[corner as usize]);
             assert_eq!(places.map(|[x, y, _]| [x, y]), *uv);
@@ -313,14 +313,14 @@ fn vertex_colours_of_a_collada_file_count_where_no_material_does() {
         "semantic=\"COLOR\" offset=\"1\"",
     );
     let seen = look(&folder.put("a.dae", text));
-    let (own, red) = seen.colors.split_at(12);
-    for (color, corners) in own.iter().zip(&seen.triangles) {
+    let (vertex_colors, red) = seen.colors.split_at(12);
+    for (color, corners) in vertex_colors.iter().zip(&seen.triangles) {
         let places = corners.map(|corner| seen.vertices[corner as usize]);
         let mean = |axis: usize| places.iter().map(|place| place[axis]).sum::<f32>() / 3.0;
         let expected = [0, 1, 2].map(|axis| (255.0 * mean(axis)).round());
         let [r, g, b, opacity] = color.unwrap();
-        for (found, expected) in [r, g, b].into_iter().zip(expected) {
-            assert!((f32::from(found) - expected).abs() <= 1.0);
+        for (channel, expected) in [r, g, b].into_iter().zip(expected) {
+            assert!((f32::from(channel) - expected).abs() <= 1.0);
         }
         assert_eq!(opacity, 255);
     }
@@ -379,13 +379,13 @@ fn gltf_colours_are_proportional_to_light() {
             .all(|color| *color == Some([255; 4]))
     );
     assert!(see("", "").iter().all(Option::is_none));
-    let own = see(",\"COLOR_0\":0", "");
+    let vertex_colors = see(",\"COLOR_0\":0", "");
     // four vertices are red and four yellow, of which some triangles have all three
     let top = |color: &Option<Color>| color.is_some_and(|color| color[0] == 255 && color[2] == 0);
-    assert!(own.iter().all(top));
+    assert!(vertex_colors.iter().all(top));
     assert!(
-        own.contains(&Some(RED)) && own.contains(&Some([255, 255, 0, 51])),
-        "{own:?}"
+        vertex_colors.contains(&Some(RED)) && vertex_colors.contains(&Some([255, 255, 0, 51])),
+        "{vertex_colors:?}"
     );
     let both = see(",\"COLOR_0\":0", factor);
     assert!(both.contains(&Some([188, 0, 0, 51])), "{both:?}");

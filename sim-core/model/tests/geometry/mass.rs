@@ -178,10 +178,10 @@ fn a_fine_torus_converges_to_its_closed_form_with_the_square_of_its_edges() {
     let along = mass * (ring * ring + 0.75 * tube * tube);
     let exact = body(mass, [across, across, along]);
     let error = |n: u32| {
-        let found = of_mesh(&format!("torus-{n}"), &torus(ring, tube, n));
-        assert!((found.inertia[2][2] / along - 1.0).abs() < 40.0 / f64::from(n * n));
-        assert!((found.inertia[0][0] / across - 1.0).abs() < 40.0 / f64::from(n * n));
-        1.0 - found.mass / exact.mass
+        let computed = of_mesh(&format!("torus-{n}"), &torus(ring, tube, n));
+        assert!((computed.inertia[2][2] / along - 1.0).abs() < 40.0 / f64::from(n * n));
+        assert!((computed.inertia[0][0] / across - 1.0).abs() < 40.0 / f64::from(n * n));
+        1.0 - computed.mass / exact.mass
     };
     let (coarse, fine) = (error(60), error(120));
     assert!(
@@ -239,8 +239,8 @@ fn an_open_mesh_weighs_as_its_hull_and_reports_it() {
         DENSITY,
     )
     .unwrap();
-    let found = robot.links[0].inertial.unwrap();
-    assert!((found.mass - solid.mass).abs() < 1e-12);
+    let inertial = robot.links[0].inertial.unwrap();
+    assert!((inertial.mass - solid.mass).abs() < 1e-12);
     let notes = robot.notes.join("\n");
     assert!(
         notes.contains("`hand`") && notes.contains("open.obj is not closed"),
@@ -257,17 +257,17 @@ fn a_link_without_inertial_weighs_as_its_collisions_together() {
     let robot = sim_model::Robot::from_urdf_text(text, "r.urdf", Default::default()).unwrap();
     let ball = 1000.0 * 4.0 / 3.0 * PI * 1e-3;
     let rod = 1000.0 * PI * 2e-3;
-    let found = robot.links[0].inertial.unwrap();
-    assert!((found.mass - ball - rod).abs() < 1e-12);
+    let inertial = robot.links[0].inertial.unwrap();
+    assert!((inertial.mass - ball - rod).abs() < 1e-12);
     let centre = (ball - rod) / (ball + rod);
-    assert!((found.pos[0] - centre).abs() < 1e-15);
+    assert!((inertial.pos[0] - centre).abs() < 1e-15);
     // along x: the ball about its middle, the rod about its axis
     let along = 0.4 * ball * 0.01 + 0.5 * rod * 0.01;
-    assert!((found.inertia[0][0] - along).abs() < 1e-12);
+    assert!((inertial.inertia[0][0] - along).abs() < 1e-12);
     // across: both about their own, and the distances
-    let own = 0.4 * ball * 0.01 + rod * (0.03 + 0.04) / 12.0;
+    let central = 0.4 * ball * 0.01 + rod * (0.03 + 0.04) / 12.0;
     let apart = ball * (1.0 - centre) * (1.0 - centre) + rod * (1.0 + centre) * (1.0 + centre);
-    assert!((found.inertia[1][1] - own - apart).abs() < 1e-12);
+    assert!((inertial.inertia[1][1] - central - apart).abs() < 1e-12);
     assert!(
         robot
             .notes

@@ -15,8 +15,8 @@ fn assert_is_the_brick(mesh: &Mesh) {
     assert!(mesh.closed);
     let [low, high] = mesh.triangles.extent();
     let expected = [[0.0; 3], [1.0, 0.5, 0.25]];
-    for (found, expected) in [low, high].iter().flatten().zip(expected.iter().flatten()) {
-        assert!((found - expected).abs() < 1e-6, "{low:?} to {high:?}");
+    for (actual, expected) in [low, high].iter().flatten().zip(expected.iter().flatten()) {
+        assert!((actual - expected).abs() < 1e-6, "{low:?} to {high:?}");
     }
     assert!((unit_density(mesh).mass - 0.125).abs() < 1e-6);
 }
@@ -158,12 +158,12 @@ fn rotations_of_gltf_nodes_are_scaled_to_unit_length() {
         "[0,1e-3,0,1e-3]",
     ] {
         let [low, high] = load(rotation).unwrap().triangles.extent();
-        for (found, expected) in low
+        for (actual, expected) in low
             .iter()
             .chain(&high)
             .zip([-0.5, 0.0, 0.0, 0.0, 1.0, 0.25])
         {
-            assert!((found - expected).abs() < 1e-6, "{low:?} to {high:?}");
+            assert!((actual - expected).abs() < 1e-6, "{low:?} to {high:?}");
         }
     }
     let error = load("[0,0,0,0]").unwrap_err().to_string();

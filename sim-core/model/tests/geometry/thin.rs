@@ -252,20 +252,20 @@ fn thin_plates_and_needles_weigh_and_turn_as_their_density_says() {
         let mesh = mapped(&prism(4, [a, b, c]), |p| rows.map(|row| dot(row, p)));
         let loaded = folder.load("a.obj", obj(&mesh)).unwrap();
         assert!(loaded.closed, "case {case}: {sides:?}");
-        let found = mass_properties(&Shape::Mesh(Arc::new(loaded)), 700.0).unwrap();
-        let own = cuboid(sides, 700.0);
+        let computed = mass_properties(&Shape::Mesh(Arc::new(loaded)), 700.0).unwrap();
+        let exact = cuboid(sides, 700.0);
         // in the frame of the corners: R I Rᵀ
         let turned = |i: usize, j: usize| -> f64 {
             (0..3)
-                .map(|k| rows[i][k] * own.inertia[k][k] * rows[j][k])
+                .map(|k| rows[i][k] * exact.inertia[k][k] * rows[j][k])
                 .sum()
         };
         let expected = Inertial {
             inertia: std::array::from_fn(|i| std::array::from_fn(|j| turned(i, j))),
-            ..own
+            ..exact
         };
         // corners are rounded to 1e-16 of the length, and a needle is as wide as 1e-7 of it
-        assert_alike(&found, &expected, 1e-8);
+        assert_alike(&computed, &expected, 1e-8);
     }
 }
 

@@ -8,7 +8,7 @@ fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-fn own() -> Robot {
+fn bundled_robot() -> Robot {
     Robot::from_urdf(
         repository().join("examples/assets/fr3/fr3_franka_hand.urdf"),
         UrdfOptions::default(),
@@ -22,7 +22,7 @@ fn names<'a, T>(indices: &[usize], all: &'a [T], name: impl Fn(&'a T) -> &'a str
 
 #[test]
 fn bodies_and_dofs_are_in_the_published_order() {
-    let robot = own();
+    let robot = bundled_robot();
     assert_eq!(
         names(&robot.link_order(), &robot.links, |link| &link.name),
         [
@@ -60,7 +60,7 @@ fn bodies_and_dofs_are_in_the_published_order() {
 
 #[test]
 fn figures_are_the_published_ones() {
-    let robot = own();
+    let robot = bundled_robot();
     let joints: Vec<_> = robot
         .moving_joints()
         .into_iter()
@@ -136,7 +136,7 @@ fn figures_are_the_published_ones() {
 
 #[test]
 fn own_description_needs_no_mending_and_no_meshes() {
-    let robot = own();
+    let robot = bundled_robot();
     assert_eq!(robot.notes, [""; 0]);
     let shapes = robot.links.iter().flat_map(|link| &link.collisions);
     assert!(shapes.clone().count() > 20);
@@ -153,9 +153,9 @@ fn own_dynamics_equal_the_references_to_the_bit() {
         return;
     }
     let mut reference = Robot::from_urdf(&path, UrdfOptions::default()).unwrap();
-    let mut own = own();
+    let mut bundled = bundled_robot();
     // link order in the file is free, order of bodies is not
-    for robot in [&mut own, &mut reference] {
+    for robot in [&mut bundled, &mut reference] {
         for link in &mut robot.links {
             // shapes of the arm are ours; those of the fingers are the published ones under other names
             if link.name.contains("finger") {
@@ -174,9 +174,9 @@ fn own_dynamics_equal_the_references_to_the_bit() {
             .map(|link| robot.links[link].clone())
             .collect()
     };
-    assert_eq!(ordered(&own), ordered(&reference));
-    assert_eq!(own.joints.len(), reference.joints.len());
-    for (a, b) in own.joints.iter().zip(&reference.joints) {
+    assert_eq!(ordered(&bundled), ordered(&reference));
+    assert_eq!(bundled.joints.len(), reference.joints.len());
+    for (a, b) in bundled.joints.iter().zip(&reference.joints) {
         let links = |robot: &Robot, joint: &sim_model::Joint| {
             (
                 robot.links[joint.parent.expect("the FR3 is fixed")]
@@ -185,15 +185,15 @@ fn own_dynamics_equal_the_references_to_the_bit() {
                 robot.links[joint.child].name.clone(),
             )
         };
-        assert_eq!(links(&own, a), links(&reference, b));
+        assert_eq!(links(&bundled, a), links(&reference, b));
         let mut a = a.clone();
         (a.parent, a.child) = (b.parent, b.child);
-        if let (Some(mine), Some(theirs)) = (&mut a.mimic, &b.mimic) {
+        if let (Some(mimic), Some(reference_mimic)) = (&mut a.mimic, &b.mimic) {
             assert_eq!(
-                own.joints[mine.joint].name,
-                reference.joints[theirs.joint].name
+                bundled.joints[mimic.joint].name,
+                reference.joints[reference_mimic.joint].name
             );
-            mine.joint = theirs.joint;
+            mimic.joint = reference_mimic.joint;
         }
         assert_eq!(&a, b);
     }

@@ -11,7 +11,7 @@ fn warning(part: &str, other: &str) -> String {
     assert!(PLAIN.contains(part), "{part}");
     let warnings = read(&PLAIN.replacen(part, other, 1)).warnings;
     match &warnings[..] {
-        [one] => one.clone(),
+        [warning] => warning.clone(),
         _ => panic!("{other}: {warnings:?}"),
     }
 }
@@ -84,7 +84,7 @@ fn a_misspelt_name_is_warned_of_with_the_one_that_may_be_meant() {
 
 #[test]
 fn what_simulators_add_to_urdf_is_no_mistake() {
-    for own in [
+    for extension in [
         "<contact><lateral_friction value=\"1\"/></contact>",
         "<self_collision_checking/>",
         "<collision_checking/>",
@@ -92,17 +92,17 @@ fn what_simulators_add_to_urdf_is_no_mistake() {
     ] {
         assert_silent(
             "<link name=\"base\"/>",
-            &format!("<link name=\"base\">{own}</link>"),
+            &format!("<link name=\"base\">{extension}</link>"),
         );
     }
-    for own in [
+    for extension in [
         "<safety_controller k_velocity=\"1\"/>",
         "<calibration rising=\"0\"/>",
         "<hardwareInterface/>",
         "<physics/>",
         "<damping_ratio/>",
     ] {
-        assert_silent("<axis", &format!("{own}<axis"));
+        assert_silent("<axis", &format!("{extension}<axis"));
     }
     assert_silent(
         "<limit ",

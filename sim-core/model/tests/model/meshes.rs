@@ -59,12 +59,12 @@ impl Drop for Package {
 #[track_caller]
 fn assert_leads_to(robot: Result<Robot, ModelError>, mesh: &Path) {
     match &robot.unwrap().links[0].collisions[0].shape {
-        Shape::Mesh(found) => {
+        Shape::Mesh(loaded) => {
             assert_eq!(
-                found.path.canonicalize().unwrap(),
+                loaded.path.canonicalize().unwrap(),
                 mesh.canonicalize().unwrap()
             );
-            assert_eq!(found.scale, [1.0, 2.0, 3.0]);
+            assert_eq!(loaded.scale, [1.0, 2.0, 3.0]);
         }
         other => panic!("{other:?}"),
     }

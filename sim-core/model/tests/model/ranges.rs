@@ -79,13 +79,13 @@ fn columns(param: Param, name: &str) -> Vec<usize> {
 #[test]
 fn names_mean_what_arrays_call_by_them() {
     let model = scene().compile().unwrap();
-    let of = |names: &[String], meant: &[&str]| -> Vec<usize> {
+    let places = |names: &[String], meant: &[&str]| -> Vec<usize> {
         let place = |name: &&str| names.iter().position(|other| other == name).unwrap();
         let mut places: Vec<usize> = meant.iter().map(place).collect();
         places.sort_unstable();
         places
     };
-    let dofs = |meant: &[&str]| of(model.dof_names(), meant);
+    let dofs = |meant: &[&str]| places(model.dof_names(), meant);
     let ball = ["arm/ball.wx", "arm/ball.wy", "arm/ball.wz"];
     let arm = [&["arm/hinge"][..], &ball].concat();
     for (name, meant) in [
@@ -103,7 +103,7 @@ fn names_mean_what_arrays_call_by_them() {
     assert_eq!(columns(Param::JointEffortLimit, "dog"), dofs(&dog));
     assert_eq!(columns(Param::JointArmature, "dog").len(), 10);
 
-    let bodies = |meant: &[&str]| of(model.body_names(), meant);
+    let bodies = |meant: &[&str]| places(model.body_names(), meant);
     for (name, meant) in [
         ("arm", &["arm/base", "arm/upper", "arm/lower"][..]),
         ("dog/upper", &["dog/upper"]),
@@ -111,7 +111,7 @@ fn names_mean_what_arrays_call_by_them() {
     ] {
         assert_eq!(columns(Param::BodyMassScale, name), bodies(meant), "{name}");
     }
-    let shapes = |meant: &[&str]| of(model.shape_names(), meant);
+    let shapes = |meant: &[&str]| places(model.shape_names(), meant);
     for (name, meant) in [
         ("ground", &["ground"][..]),
         ("cube", &["cube/box", "cube/lid"]),
@@ -129,15 +129,15 @@ fn names_mean_what_arrays_call_by_them() {
 fn the_more_special_name_holds() {
     let other = |high| Distribution::Uniform { low: 0.0, high };
     let (joint, part) = (other(2.0), other(3.0));
-    let found = draws(&[
+    let drawn = draws(&[
         (Param::JointDamping, "arm", SOME),
         (Param::JointDamping, "arm/ball", joint),
         (Param::JointDamping, "arm/ball.wy", part),
         (Param::ShapeMu, "cube", SOME),
         (Param::ShapeMu, "cube/lid", part),
     ]);
-    let found: Vec<Distribution> = found.iter().map(|draw| draw.distribution).collect();
-    assert_eq!(found, [SOME, joint, part, joint, SOME, part]);
+    let distributions: Vec<Distribution> = drawn.iter().map(|draw| draw.distribution).collect();
+    assert_eq!(distributions, [SOME, joint, part, joint, SOME, part]);
 }
 
 #[test]

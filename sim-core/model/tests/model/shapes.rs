@@ -117,8 +117,8 @@ fn surfaces_that_no_contact_can_have_are_refused_by_shape_and_field() {
         assert_says(&message, &[&["shape `table`"], says].concat());
         let borne =
             |scene: &mut Description| change(&mut scene.robots[0].links[0].collisions[2].surface);
-        let whose = ["robot `r`", "link `hand`", "collision `tip`"];
-        assert_says(&refusal(borne), &[&whose, says].concat());
+        let path = ["robot `r`", "link `hand`", "collision `tip`"];
+        assert_says(&refusal(borne), &[&path, says].concat());
     }
     let mut smooth = scene();
     smooth.shapes[0].surface.condim = 1;
@@ -128,7 +128,7 @@ fn surfaces_that_no_contact_can_have_are_refused_by_shape_and_field() {
 
 #[test]
 fn groups_meet_as_newtons_do() {
-    let of = |group| Surface {
+    let surface = |group| Surface {
         group,
         ..Surface::default()
     };
@@ -136,8 +136,16 @@ fn groups_meet_as_newtons_do() {
     let miss = [(0, 0), (0, 1), (0, -1), (1, 2), (-2, -2), (-1, -1)];
     for (pairs, expected) in [(&meet[..], true), (&miss[..], false)] {
         for &(a, b) in pairs {
-            assert_eq!(of(a).meets(&of(b)), expected, "groups {a} and {b}");
-            assert_eq!(of(b).meets(&of(a)), expected, "groups {b} and {a}");
+            assert_eq!(
+                surface(a).meets(&surface(b)),
+                expected,
+                "groups {a} and {b}"
+            );
+            assert_eq!(
+                surface(b).meets(&surface(a)),
+                expected,
+                "groups {b} and {a}"
+            );
         }
     }
 }

@@ -131,16 +131,16 @@ fn origins_are_those_of_collisions() {
 #[test]
 fn a_colour_is_the_visuals_own_or_that_of_its_name() {
     let package = Package::new("colours");
-    let of = |material: &str| format!("<visual name=\"v\">{CUBE}{material}</visual>");
+    let with_material = |material: &str| format!("<visual name=\"v\">{CUBE}{material}</visual>");
     let visuals = package.visuals(&format!(
         "<material name=\"red\"><color rgba=\"1 0 0 0.5\"/></material>\
          <link name=\"a\">{}{}{}</link><link name=\"b\">{}{}{}</link>",
-        of("<material name=\"red\"/>"),
-        of("<material name=\"blue\"/>"),
-        of("<material name=\"red\"><color rgba=\"0 1 0 1\"/></material>"),
-        of("<material name=\"\"><color rgba=\"0.25 0.5 2\"/></material>"),
-        of("<material name=\"blue\"><color rgba=\"0 0 1 1\"/></material>"),
-        of("<material name=\"unknown\"/>"),
+        with_material("<material name=\"red\"/>"),
+        with_material("<material name=\"blue\"/>"),
+        with_material("<material name=\"red\"><color rgba=\"0 1 0 1\"/></material>"),
+        with_material("<material name=\"\"><color rgba=\"0.25 0.5 2\"/></material>"),
+        with_material("<material name=\"blue\"><color rgba=\"0 0 1 1\"/></material>"),
+        with_material("<material name=\"unknown\"/>"),
     ));
     let colors: Vec<_> = visuals.visuals.iter().map(|visual| visual.color).collect();
     assert_eq!(

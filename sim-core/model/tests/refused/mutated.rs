@@ -93,14 +93,14 @@ enum Damage {
 
 fn damages() -> impl Strategy<Value = Vec<Damage>> {
     let index = any::<prop::sample::Index>;
-    let one = prop_oneof![
+    let any_damage = prop_oneof![
         2 => (index(), 0..60_usize, "[ -~\\n\u{0}\u{e9}]{0,12}").prop_map(|(a, n, p)| Damage::Patch(a, n, p)),
         4 => (index(), values()).prop_map(|(a, v)| Damage::Value(a, v)),
         2 => index().prop_map(Damage::Drop),
         2 => (index(), index()).prop_map(|(a, b)| Damage::Copy(a, b)),
         1 => (index(), index()).prop_map(|(a, b)| Damage::Swap(a, b)),
     ];
-    prop::collection::vec(one, 1..4)
+    prop::collection::vec(any_damage, 1..4)
 }
 
 /// The text in pieces: tags, and what is between them.
@@ -148,7 +148,7 @@ fn damage(text: &str, damages: &[Damage]) -> String {
                 let copy = pieces[tag(from)].clone();
                 pieces.insert(tag(to), copy);
             }
-            Damage::Swap(one, other) => pieces.swap(tag(one), tag(other)),
+            Damage::Swap(first, other) => pieces.swap(tag(first), tag(other)),
         }
         text = pieces.concat();
     }

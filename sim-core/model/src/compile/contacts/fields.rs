@@ -16,11 +16,11 @@ const POINTS_OF_A_PRISM: usize = 6;
 
 /// The height fields among shapes, in the order of their rows.
 fn fields<'a>(shapes: &'a [PlacedShape<'_>]) -> Vec<(usize, &'a HeightField)> {
-    let of = |(index, shape): (usize, &'a PlacedShape<'_>)| match shape.shape {
+    let as_field = |(index, shape): (usize, &'a PlacedShape<'_>)| match shape.shape {
         Shape::HeightField(field) => Some((index, &**field)),
         _ => None,
     };
-    shapes.iter().enumerate().filter_map(of).collect()
+    shapes.iter().enumerate().filter_map(as_field).collect()
 }
 
 /// Adds the tables of all height fields to those of the contacts.
@@ -79,33 +79,37 @@ pub(super) fn add_fields(
     }
     let (mut sizes, mut heights) = (Vec::new(), Vec::new());
     let (mut ceilings, mut tops) = (Vec::new(), Vec::new());
-    for (&(index, own), farthest) in all.iter().zip(farthest) {
+    for (&(index, grid), farthest) in all.iter().zip(farthest) {
         let piece = pieces.iter().find(|piece| piece.shape == index);
         let solid = &piece.expect("every field is a piece").solid;
-        let [dx, dy] = own.cell();
+        let [dx, dy] = grid.cell();
         // its centre in its own axes, from the world's origin
         let center: [f64; 3] =
             std::array::from_fn(|i| (0..3).map(|k| solid.axes[i][k] * solid.center[k]).sum());
-        let base = [center[0] - own.half[0], center[1] - own.half[1], center[2]];
+        let base = [
+            center[0] - grid.half[0],
+            center[1] - grid.half[1],
+            center[2],
+        ];
         let length = libm::hypot(dx, dy);
-        let extent = (0..2).map(|i| base[i].abs() + 2.0 * own.half[i]);
+        let extent = (0..2).map(|i| base[i].abs() + 2.0 * grid.half[i]);
         let mut row = [0.0; field::LEN];
         row[field::BASE..][..3].copy_from_slice(&base);
         row[field::CELL..][..2].copy_from_slice(&[dx, dy]);
         row[field::INVERSE..][..2].copy_from_slice(&[1.0 / dx, 1.0 / dy]);
         row[field::CELLS..][..2]
-            .copy_from_slice(&[own.columns - 1, own.rows - 1].map(|n| n as f64));
+            .copy_from_slice(&[grid.columns - 1, grid.rows - 1].map(|n| n as f64));
         row[field::FIRST] = heights.len() as f64;
-        row[field::BOTTOM] = own.bottom;
+        row[field::BOTTOM] = grid.bottom;
         row[field::EXTENT] = extent.fold(0.0, f64::max);
         row[field::TILES_FIRST] = ceilings.len() as f64;
-        row[field::TILES] = (own.columns - 1).div_ceil(TILE) as f64;
+        row[field::TILES] = (grid.columns - 1).div_ceil(TILE) as f64;
         row[field::ACROSS..][..2].copy_from_slice(&[dy / length, -dx / length]);
         row[field::DIAGONAL] = 1.0 / (dx * dx + dy * dy);
         sizes.extend(row);
-        heights.extend(&own.elevations);
-        ceilings.extend(highest(own, farthest));
-        tops.extend(highest_corners(own));
+        heights.extend(&grid.elevations);
+        ceilings.extend(highest(grid, farthest));
+        tops.extend(highest_corners(grid));
     }
     let cells_max = under.iter().max().map_or(0, |&most| most as usize);
     let memory = &mut contacts.memory;
@@ -172,15 +176,16 @@ fn highest(field: &HeightField, reach: f64) -> Vec<f64> {
     let mut lines = vec![f64::NEG_INFINITY; rows * tiles[0]];
     for row in 0..rows {
         for tile in 0..tiles[0] {
-            let own = &field.elevations[row * columns..][window(tile, 0, columns)];
-            lines[row * tiles[0] + tile] = own.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let elevations = &field.elevations[row * columns..][window(tile, 0, columns)];
+            lines[row * tiles[0] + tile] =
+                elevations.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         }
     }
     let mut all = Vec::with_capacity(tiles[0] * tiles[1]);
     for tile in 0..tiles[1] {
         for column in 0..tiles[0] {
-            let own = window(tile, 1, rows).map(|row| lines[row * tiles[0] + column]);
-            all.push(own.fold(f64::NEG_INFINITY, f64::max));
+            let maxima = window(tile, 1, rows).map(|row| lines[row * tiles[0] + column]);
+            all.push(maxima.fold(f64::NEG_INFINITY, f64::max));
         }
     }
     all

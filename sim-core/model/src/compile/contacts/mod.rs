@@ -171,21 +171,21 @@ impl ContactBuilder<'_> {
         let mut impedances: Vec<Impedance<f64>> = Vec::new();
         let mut of_pairs = Vec::new();
         for &pair in pairs {
-            let own = self.impedance(pair);
-            let place = impedances.iter().position(|known| *known == own);
+            let impedance = self.impedance(pair);
+            let place = impedances.iter().position(|known| *known == impedance);
             of_pairs.push(place.unwrap_or(impedances.len()));
             if place.is_none() {
-                impedances.push(own);
+                impedances.push(impedance);
             }
         }
         if impedances == [self.constants.contact_impedance] {
             return;
         }
         let of_class = |class| {
-            let own = contacts.pairs.iter().zip(&of_pairs);
-            let own = own.filter(|(pair, _)| pair.class == class);
-            let own: BTreeSet<usize> = own.map(|(_, &place)| place).collect();
-            own.into_iter().collect()
+            let placed_pairs = contacts.pairs.iter().zip(&of_pairs);
+            let placed_pairs = placed_pairs.filter(|(pair, _)| pair.class == class);
+            let places: BTreeSet<usize> = placed_pairs.map(|(_, &place)| place).collect();
+            places.into_iter().collect()
         };
         let of_classes = (0..contacts.classes.len()).map(of_class).collect();
         let of_pair = Fixed {
@@ -331,8 +331,10 @@ impl ContactBuilder<'_> {
         }
         let pattern = &self.constants.pattern;
         let n = self.constants.dofs.len();
-        let own = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
-        let own: Vec<_> = own.filter(|&(i, j)| pattern.find(i, j).is_some()).collect();
+        let lower_entries = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        let lower_entries: Vec<_> = lower_entries
+            .filter(|&(i, j)| pattern.find(i, j).is_some())
+            .collect();
         let more = contacts.classes.iter().flat_map(|class| {
             let dof = |c: usize| class.columns[c].dof;
             let pairs = class.entries.iter().enumerate();
@@ -341,9 +343,9 @@ impl ContactBuilder<'_> {
                 others.map(move |other| (dof(c), dof(other)))
             })
         });
-        let coupled = Pattern::new(n, own.iter().copied().chain(more));
+        let coupled = Pattern::new(n, lower_entries.iter().copied().chain(more));
         let mut places = vec![0; pattern.len()];
-        for &(i, j) in &own {
+        for &(i, j) in &lower_entries {
             places[pattern.at(i, j)] = coupled.at(i, j);
         }
         Coupled {

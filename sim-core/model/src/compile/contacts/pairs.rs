@@ -125,7 +125,7 @@ impl ContactBuilder<'_> {
                 solref,
                 ..geom.softness
             });
-            let sliding = sliding.map(|own| own.reference(self.scene.dt, is_safe).1);
+            let sliding = sliding.map(|softness| softness.reference(self.scene.dt, is_safe).1);
             row[pair::SLIDING] = sliding.unwrap_or(damping);
             return;
         }

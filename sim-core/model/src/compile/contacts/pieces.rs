@@ -197,11 +197,11 @@ fn connected(
 ) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (index, robot) in scene.robots.iter().enumerate() {
-        let of = |link: usize| group(constants, index, &carriers[index][link]);
+        let group_of = |link: usize| group(constants, index, &carriers[index][link]);
         let holds = |joint: &&Joint| joint.moves() && !parts_from_fixed(joint, &carriers[index]);
         for joint in robot.joints.iter().filter(holds) {
             if let Some(parent) = joint.parent {
-                pairs.push((of(parent), of(joint.child)));
+                pairs.push((group_of(parent), group_of(joint.child)));
             }
         }
     }

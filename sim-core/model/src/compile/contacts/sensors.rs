@@ -23,16 +23,18 @@ pub(super) fn add_touched_bodies(constants: &mut Constants<f64>) {
     let mut of_classes: Vec<Vec<usize>> = vec![Vec::new(); contacts.classes.len()];
     let mut places = Vec::with_capacity(2 * contacts.pairs.len());
     for pair in &contacts.pairs {
-        let own = &mut of_classes[pair.class];
+        let bodies = &mut of_classes[pair.class];
         for link in pair.links {
             let body = link.and_then(body_of);
-            let place = body.map(|body| match own.iter().position(|other| *other == body) {
-                Some(place) => place,
-                None => {
-                    own.push(body);
-                    own.len() - 1
-                }
-            });
+            let place = body.map(
+                |body| match bodies.iter().position(|other| *other == body) {
+                    Some(place) => place,
+                    None => {
+                        bodies.push(body);
+                        bodies.len() - 1
+                    }
+                },
+            );
             places.push(place.map_or(0.0, |place| (place + 1) as f64));
         }
     }
@@ -88,8 +90,11 @@ pub(in crate::compile) fn add_contact_sensors(
             let Some(sensor) = sensors.next() else { break };
             let senses: Vec<f64> = match sense {
                 Sense::Touch(zone) => {
-                    let own = |side: &Side| matches!(side.of, Some((other, link, _)) if (other, link) == (robot, zone.site.link));
-                    let sense = |[a, b]: &[Side; 2]| match (own(a), own(b)) {
+                    let is_on_link = |side: &Side| {
+                        side.of
+                            .is_some_and(|owner| (owner.0, owner.1) == (robot, zone.site.link))
+                    };
+                    let sense = |[a, b]: &[Side; 2]| match (is_on_link(a), is_on_link(b)) {
                         (true, _) => 1.0,
                         (_, true) => -1.0,
                         _ => 0.0,
@@ -97,12 +102,13 @@ pub(in crate::compile) fn add_contact_sensors(
                     both.iter().map(sense).collect()
                 }
                 Sense::Contact { first, second, .. } => {
-                    let own = |side: &Side, what: Touching| is_of(parts, robot, side, what);
+                    let belongs = |side: &Side, what: Touching| is_of(parts, robot, side, what);
                     let sense = |[a, b]: &[Side; 2]| {
-                        let (one, two) = if a.rank <= b.rank { (a, b) } else { (b, a) };
+                        let (lower, higher) = if a.rank <= b.rank { (a, b) } else { (b, a) };
                         let order = if a.rank <= b.rank { 1.0 } else { -1.0 };
-                        let found = [one, two].map(|side| (own(side, *first), own(side, *second)));
-                        order * direction(*first, *second, found)
+                        let matches = [lower, higher]
+                            .map(|side| (belongs(side, *first), belongs(side, *second)));
+                        order * direction(*first, *second, matches)
                     };
                     both.iter().map(sense).collect()
                 }
@@ -148,13 +154,15 @@ fn capsules(contacts: &Contacts<f64>, senses: &[f64]) -> Vec<(usize, usize)> {
     let Some(group) = contacts.group((Kind::Plane, Kind::Capsule)) else {
         return Vec::new();
     };
-    let own = (group.first..group.end).filter(|&pair| senses[pair] != 0.0);
+    let sensed = (group.first..group.end).filter(|&pair| senses[pair] != 0.0);
     let solid = |pair: usize| {
         let shapes = contacts.pairs[pair].shapes;
         let mut solids = contacts.solids.iter();
         solids.position(|solid| solid.kind == Kind::Capsule && shapes.contains(&solid.shape))
     };
-    own.filter_map(|pair| Some((pair, solid(pair)?))).collect()
+    sensed
+        .filter_map(|pair| Some((pair, solid(pair)?)))
+        .collect()
 }
 
 /// The shapes of a scene, by their numbers.
@@ -171,8 +179,8 @@ fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
         let geom = shape.robot.and_then(|robot| {
             let parts = scene.robots[robot].precompiled.as_ref()?;
             let geoms = parts.frames.geoms.iter().zip(&parts.frames.collisions);
-            geoms.enumerate().find_map(|(geom, (on, own))| {
-                (on.link == shape.own_link && *own == Some(collision)).then_some(geom)
+            geoms.enumerate().find_map(|(geom, (on, geom_collision))| {
+                (on.link == shape.own_link && *geom_collision == Some(collision)).then_some(geom)
             })
         });
         let kind = match shape.shape {
@@ -202,33 +210,33 @@ fn is_of(parts: &Precompiled, robot: usize, side: &Side, what: Touching) -> bool
     };
     match what {
         Touching::Anything | Touching::InZone => true,
-        Touching::Geom(own) => own == geom,
-        Touching::Link(own) => own == link,
-        Touching::Subtree(own) => {
+        Touching::Geom(wanted) => wanted == geom,
+        Touching::Link(wanted) => wanted == link,
+        Touching::Subtree(wanted) => {
             let mut next = link;
-            while next > own {
+            while next > wanted {
                 next = parts.parents[next];
             }
-            next == own
+            next == wanted
         }
     }
 }
 
 /// 1 where a contact goes from the first object of a sensor to the second, -1 where it is the other way, 0 for none. Of each
 /// shape: whether it is of the first, and of the second object.
-fn direction(first: Touching, second: Touching, [one, two]: [(bool, bool); 2]) -> f64 {
-    if !(one.0 || two.0) || !(one.1 || two.1) {
+fn direction(first: Touching, second: Touching, [lower, higher]: [(bool, bool); 2]) -> f64 {
+    if !(lower.0 || higher.0) || !(lower.1 || higher.1) {
         return 0.0;
     }
     let (has_first, has_second) = (first != Touching::Anything, second != Touching::Anything);
     let is_regular = match (has_first, has_second) {
-        (true, true) => match (one.0 && two.1, two.0 && one.1) {
+        (true, true) => match (lower.0 && higher.1, higher.0 && lower.1) {
             (true, _) => true,
             (_, true) => false,
             _ => return 0.0,
         },
-        (true, false) => one.0,
-        (false, true) => two.1,
+        (true, false) => lower.0,
+        (false, true) => higher.1,
         (false, false) => true,
     };
     if is_regular { 1.0 } else { -1.0 }

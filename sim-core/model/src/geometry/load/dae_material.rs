@@ -26,13 +26,13 @@ pub(super) struct Materials<'a, 'input> {
 
 impl<'a, 'input> Materials<'a, 'input> {
     pub fn new(root: Node<'a, 'input>, folder: &Path) -> Materials<'a, 'input> {
-        let found = root.descendants().filter_map(|node| {
+        let elements = root.descendants().filter_map(|node| {
             let kind = KINDS.into_iter().find(|kind| node.has_tag_name_of(kind))?;
             Some(((kind, node.attribute("id")?), node))
         });
         Materials {
             folder: folder.to_owned(),
-            by_kind_and_id: found.collect(),
+            by_kind_and_id: elements.collect(),
             read: HashMap::new(),
             broken: false,
         }
@@ -50,16 +50,16 @@ impl<'a, 'input> Materials<'a, 'input> {
             }
             let target = node.attribute("target").unwrap_or_default();
             let id = target.strip_prefix('#').unwrap_or_default();
-            let found = match self.read.get(id) {
-                Some(found) => found.clone(),
+            let bound_material = match self.read.get(id) {
+                Some(known) => known.clone(),
                 None => {
-                    let found = self.material(id);
-                    self.broken |= found.is_none();
-                    self.read.insert(id, found.clone());
-                    found
+                    let material = self.material(id);
+                    self.broken |= material.is_none();
+                    self.read.insert(id, material.clone());
+                    material
                 }
             };
-            if let (Some(symbol), Some(material)) = (node.attribute("symbol"), found) {
+            if let (Some(symbol), Some(material)) = (node.attribute("symbol"), bound_material) {
                 bound.insert(symbol, material);
             }
         }
@@ -131,8 +131,8 @@ impl<'a, 'input> Scope<'_, 'a, 'input> {
             "color" => color(value).map(Value::Color),
             "texture" => self.image(value.attribute("texture")?).map(Value::Image),
             "param" => {
-                let found = self.parameter(value.attribute("ref").unwrap_or_default());
-                let number = found.and_then(|node| {
+                let parameter = self.parameter(value.attribute("ref").unwrap_or_default());
+                let number = parameter.and_then(|node| {
                     ["float3", "float4"]
                         .into_iter()
                         .find_map(|name| node.child(name))
@@ -172,8 +172,8 @@ impl<'a, 'input> Scope<'_, 'a, 'input> {
 
 /// Red, green, blue and opacity; what is left out is 0, and opaque.
 fn color(node: Node) -> Option<[f64; 4]> {
-    let found = numbers::<f64>(Some(node)).ok()?;
-    let part = |at: usize, default| found.get(at).copied().unwrap_or(default);
+    let numbers = numbers::<f64>(Some(node)).ok()?;
+    let part = |at: usize, default| numbers.get(at).copied().unwrap_or(default);
     Some([part(0, 0.0), part(1, 0.0), part(2, 0.0), part(3, 1.0)])
 }
 

@@ -238,9 +238,9 @@ impl<'a, 'input> Geometry<'_, 'a, 'input> {
             .collect();
         if let Some(count) = count {
             if count > points.len() {
-                let found = points.len();
+                let present = points.len();
                 return Err(format!(
-                    "an <accessor> tells of {count} points, there are {found}; export it again"
+                    "an <accessor> tells of {count} points, there are {present}; export it again"
                 ));
             }
             points.truncate(count);

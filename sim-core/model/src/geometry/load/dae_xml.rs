@@ -30,8 +30,8 @@ pub(super) fn referred<'a, 'input>(
     attribute: &str,
 ) -> Result<Node<'a, 'input>, String> {
     let url = node.attribute(attribute).unwrap_or_default();
-    let found = url.strip_prefix('#').and_then(|id| by_id.get(id));
-    found.copied().ok_or_else(|| {
+    let element = url.strip_prefix('#').and_then(|id| by_id.get(id));
+    element.copied().ok_or_else(|| {
         let name = node.tag_name().name();
         format!("<{name} {attribute}=\"{url}\"> refers to nothing in the file; export it again")
     })

@@ -171,13 +171,13 @@ impl Scene<'_> {
             let corners: Vec<u32> = indices.iter().map(|index| first + index).collect();
             raw.extend(&corners, &places);
             if self.limits.looks {
-                let own = places
+                let faces = places
                     .iter()
                     .map(|places| places.map(|at| indices[at] as usize));
-                let own: Vec<[usize; 3]> = own.collect();
+                let faces: Vec<[usize; 3]> = faces.collect();
                 raw.runs.push(Run {
                     first: first_triangle,
-                    ..gltf_material::looks(&primitive, &own, &self.buffers, &mut self.images)
+                    ..gltf_material::looks(&primitive, &faces, &self.buffers, &mut self.images)
                 });
             }
         }

@@ -32,16 +32,16 @@ impl<'a> Images<'a> {
         if let Some(image) = self.read.get(&image.index()) {
             return Some(image.clone());
         }
-        let found = match image.source() {
+        let content = match image.source() {
             Source::View { view, .. } => Image::Bytes(buffers.view(&view)?.to_vec()),
             Source::Uri { uri, .. } => match uri.strip_prefix("data:") {
                 Some(data) => Image::Bytes(base64_of(data).ok()?),
                 None => Image::File(self.folder.join(uri)),
             },
         };
-        let found = Rc::new(found);
-        self.read.insert(image.index(), found.clone());
-        Some(found)
+        let content = Rc::new(content);
+        self.read.insert(image.index(), content.clone());
+        Some(content)
     }
 }
 

@@ -34,9 +34,9 @@ impl Buffers {
                 buffer::Source::Uri(uri) => external(uri, folder, &mut beside)?,
             };
             if data.len() < buffer.length() {
-                let (declared, found) = (buffer.length(), data.len());
+                let (declared, present) = (buffer.length(), data.len());
                 return Err(format!(
-                    "a buffer should have {declared} bytes and has {found}; copy or export it again"
+                    "a buffer should have {declared} bytes and has {present}; copy or export it again"
                 ));
             }
             total += data.len() as u64;

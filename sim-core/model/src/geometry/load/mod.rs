@@ -187,7 +187,7 @@ impl Source<'_> {
     fn renamed(&self) -> Option<String> {
         let (format, ending) = contents::mesh_format(&self.bytes)?;
         match format_of(Path::new(&format!("mesh{ending}"))) {
-            Ok(own) if own as u8 == self.format as u8 => None,
+            Ok(by_ending) if by_ending as u8 == self.format as u8 => None,
             Ok(_) => Some(format!("it is {format}; end its name in {ending}")),
             Err(reason) => Some(format!("it is {format}: {reason}")),
         }

@@ -20,9 +20,9 @@ pub(super) fn read(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
         return read_text(bytes, limits);
     }
     let Some(claimed) = claimed else {
-        let found = bytes.len();
+        let size = bytes.len();
         return Err(format!(
-            "it has {found} bytes, a binary STL file at least {HEADER}; export it again"
+            "it has {size} bytes, a binary STL file at least {HEADER}; export it again"
         ));
     };
     let held = (bytes.len() - HEADER) / RECORD;
@@ -84,9 +84,9 @@ fn read_text(bytes: &[u8], limits: Limits) -> Result<RawMesh, String> {
             ended = false;
         } else if word.eq_ignore_ascii_case("endloop") {
             let [a, b, c] = corners[..] else {
-                let found = corners.len();
+                let count = corners.len();
                 return Err(format!(
-                    "the facet that ends in line {line} has {found} corners, not 3; export it again"
+                    "the facet that ends in line {line} has {count} corners, not 3; export it again"
                 ));
             };
             mesh.triangle([a, b, c]);

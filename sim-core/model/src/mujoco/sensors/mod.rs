@@ -82,8 +82,8 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
     parts.geoms = rays
         .map(|(on, ray)| ray.unwrap_or_else(|| unseen(on)))
         .collect();
-    if let Some(own) = &mut robot.precompiled {
-        own.sensors = parts;
+    if let Some(precompiled) = &mut robot.precompiled {
+        precompiled.sensors = parts;
     }
     Ok(())
 }
@@ -124,8 +124,8 @@ impl<'a> Reader<'a> {
         for (array, width) in [("sensor_delay", 1), ("sensor_interval", 2)] {
             if file.has(array) {
                 let all = file.reals(array, count * width)?;
-                for (is_late, own) in late.iter_mut().zip(all.chunks_exact(width)) {
-                    *is_late |= own[0] > 0.0;
+                for (is_late, values) in late.iter_mut().zip(all.chunks_exact(width)) {
+                    *is_late |= values[0] > 0.0;
                 }
             }
         }

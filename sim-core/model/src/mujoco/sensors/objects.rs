@@ -14,8 +14,8 @@ impl Reader<'_> {
     ) -> Result<Result<OnLink, String>, ModelError> {
         let id = self.ids[which][k];
         let place = |frames: &[OnLink]| {
-            let own = usize::try_from(id).ok().and_then(|id| frames.get(id));
-            own.copied().ok_or_else(|| self.fault(k))
+            let frame = usize::try_from(id).ok().and_then(|id| frames.get(id));
+            frame.copied().ok_or_else(|| self.fault(k))
         };
         let body = |pose: fn(&Reader<'_>, usize) -> Pose| {
             let link = usize::try_from(id)
@@ -97,9 +97,9 @@ impl Reader<'_> {
         if self.robot.joints[joint].dofs.len() == 1 {
             return Ok(Sense::JointLimit(joint, part));
         }
-        let own = Measure::Angle { joint };
+        let angle = Measure::Angle { joint };
         Ok(Sense::ConstraintLimit(
-            self.limit(|measure| *measure == own),
+            self.limit(|measure| *measure == angle),
             part,
         ))
     }
