@@ -154,8 +154,18 @@ impl Param {
             Param::BodyF => vec![0.0; 6 * m.frames.len()],
             Param::BodyMass => scene.masses.clone(),
             Param::BodyInertia => scene.inertias.as_flattened().to_vec(),
-            Param::ActuatorGain => m.actuators.all.iter().flat_map(|own| own.gain).collect(),
-            Param::ActuatorBias => m.actuators.all.iter().flat_map(|own| own.bias).collect(),
+            Param::ActuatorGain => m
+                .actuators
+                .all
+                .iter()
+                .flat_map(|actuator| actuator.gain)
+                .collect(),
+            Param::ActuatorBias => m
+                .actuators
+                .all
+                .iter()
+                .flat_map(|actuator| actuator.bias)
+                .collect(),
         }
     }
 

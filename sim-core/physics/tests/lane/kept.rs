@@ -36,13 +36,13 @@ fn kept_lists_are_bitwise_the_same_in_every_width_and_order() {
     let worlds = inputs(200);
     let order: Vec<usize> = (0..200).map(|i| (i * 37 + 5) % 200).collect();
     let permuted: Vec<_> = order.iter().map(|i| worlds[*i]).collect();
-    let one = bits(&contacts_of::<f32>(&worlds));
-    for (width, found) in contacts_in_every_width(&worlds) {
-        assert_eq!(bits(&found), one, "{width} worlds");
+    let expected = bits(&contacts_of::<f32>(&worlds));
+    for (width, contacts) in contacts_in_every_width(&worlds) {
+        assert_eq!(bits(&contacts), expected, "{width} worlds");
     }
-    for (width, found) in contacts_in_every_width(&permuted) {
-        for (i, result) in order.iter().zip(&bits(&found)) {
-            assert_eq!(result, &one[*i], "{width} worlds");
+    for (width, contacts) in contacts_in_every_width(&permuted) {
+        for (i, result) in order.iter().zip(&bits(&contacts)) {
+            assert_eq!(result, &expected[*i], "{width} worlds");
         }
     }
 }

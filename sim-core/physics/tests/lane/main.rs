@@ -163,8 +163,8 @@ fn worlds_of_a_block_equal_one_bitwise() {
     // blocks that are not full, too
     for count in [27, 75] {
         let worlds = inputs(count);
-        for (width, found) in solve_in_every_width(&worlds) {
-            assert_eq!(bits(&found), bits(&scalar(&worlds)), "{width} worlds");
+        for (width, solved) in solve_in_every_width(&worlds) {
+            assert_eq!(bits(&solved), bits(&scalar(&worlds)), "{width} worlds");
         }
     }
 }
@@ -223,8 +223,8 @@ fn order_of_worlds_does_not_change_their_bits() {
         .zip(solve_in_every_width(&permuted));
     for ((width, straight), (_, other)) in both {
         for (i, result) in order.iter().zip(&other) {
-            let (found, expected) = (std::slice::from_ref(result), &straight[*i..=*i]);
-            assert_eq!(bits(found), bits(expected), "{width} worlds");
+            let (actual, expected) = (std::slice::from_ref(result), &straight[*i..=*i]);
+            assert_eq!(bits(actual), bits(expected), "{width} worlds");
         }
     }
 }
@@ -243,10 +243,10 @@ fn random_programs_agree_bitwise_in_every_width() {
         let mut random = toy::Random(seed + 1000);
         let steps = toy::program(&mut random, 3, 4, 12);
         let worlds = toy::worlds::<{ toy::INPUTS }>(&mut random, 40);
-        let one = same_bits(&toy::on_cpu::<f32>(&steps, &worlds));
-        for (width, found) in run_in_every_width(&steps, &worlds) {
-            let found = same_bits(&found);
-            assert_eq!(found, one, "{width} worlds, seed {seed}: {steps:#?}");
+        let expected = same_bits(&toy::on_cpu::<f32>(&steps, &worlds));
+        for (width, outputs) in run_in_every_width(&steps, &worlds) {
+            let outputs = same_bits(&outputs);
+            assert_eq!(outputs, expected, "{width} worlds, seed {seed}: {steps:#?}");
         }
     }
 }
@@ -293,8 +293,8 @@ fn a_world_that_stopped_does_not_move_with_its_neighbours() {
     let worlds: Vec<[f32; 1]> = (0..48).map(|i| [(i * 7 % 48) as f32]).collect();
     let expected: Vec<Vec<f32>> = worlds.iter().map(|x| x.to_vec()).collect();
     assert_eq!(counted_down::<f32>(&worlds), expected);
-    for (width, found) in count_down_in_every_width(&worlds) {
-        assert_eq!(found, expected, "{width} worlds");
+    for (width, counted) in count_down_in_every_width(&worlds) {
+        assert_eq!(counted, expected, "{width} worlds");
     }
 }
 
@@ -362,8 +362,8 @@ fn a_row_outside_its_table_is_found_in_debug_builds() {
 #[test]
 fn what_other_worlds_add_leaves_the_sign_of_a_zero() {
     let worlds: Vec<[f32; 3]> = (0..16).map(|k| [k as f32 - 7.5, 0.0, 0.0]).collect();
-    for (width, found) in add_in_every_width(&worlds) {
-        for (world, sum) in worlds.iter().zip(&found) {
+    for (width, sums) in add_in_every_width(&worlds) {
+        for (world, sum) in worlds.iter().zip(&sums) {
             let expected = if world[0] > 0.0 { 3.0 * world[0] } else { -0.0 };
             assert_eq!(
                 sum[0].to_bits(),

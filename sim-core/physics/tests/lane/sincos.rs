@@ -75,12 +75,12 @@ fn sine_near_zero_is_good_relatively() {
 #[test]
 fn sincos_is_bitwise_the_same_in_every_width() {
     let angles: Vec<f32> = angles(1e6).into_iter().map(|x| x as f32).collect();
-    let one = sincos::<f32>(&angles);
+    let expected = sincos::<f32>(&angles);
     let bits = |(s, c): (f32, f32)| (s.to_bits(), c.to_bits());
-    for (width, found) in sincos_in_every_width(&angles) {
-        let same = found
+    for (width, results) in sincos_in_every_width(&angles) {
+        let same = results
             .into_iter()
-            .zip(&one)
+            .zip(&expected)
             .all(|(a, b)| bits(a) == bits(*b));
         assert!(same, "{width} worlds");
     }

@@ -42,9 +42,9 @@ macro_rules! eliminate {
         $(
             #[inline(always)]
             fn $name<F: Num, const S: usize>(p: usize, a: &mut [F], x: &mut [F]) {
-                let (above, own) = a[..tri(p + S, 0)].split_at_mut(tri(p, 0));
+                let (above, entries) = a[..tri(p + S, 0)].split_at_mut(tri(p, 0));
                 let (x_above, x) = x[..p + S].split_at_mut(p);
-                let mut tile = Removed::<F, S>::new(own, p, x);
+                let mut tile = Removed::<F, S>::new(entries, p, x);
                 $(tile.subtract_from(&mut above[tri($i, 0)..tri($i + 1, 0)], &mut x_above[$i]);)*
             }
         )*
@@ -74,9 +74,9 @@ pub(super) fn forward<F: Num>(size: usize, factor: &[F], x: &mut [F]) {
 
 #[inline(always)]
 fn forward_tile<F: Num, const S: usize>(p: usize, factor: &[F], x: &mut [F]) {
-    let own = &factor[tri(p, 0)..tri(p + S, 0)];
+    let entries = &factor[tri(p, 0)..tri(p + S, 0)];
     let (x_above, x) = x[..p + S].split_at_mut(p);
-    tree::forward::<F, S>(own, &ROWS[..p], x_above, x);
+    tree::forward::<F, S>(entries, &ROWS[..p], x_above, x);
 }
 
 #[inline(always)]

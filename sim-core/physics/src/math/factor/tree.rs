@@ -45,34 +45,34 @@ const UNROLLED: usize = 12;
 #[inline(always)]
 pub(super) fn solve<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F], x: &mut [F]) {
     for segment in pattern.segments(block).iter().rev() {
-        let (above, own) = a[..segment.range().end].split_at_mut(segment.start);
+        let (above, entries) = a[..segment.range().end].split_at_mut(segment.start);
         let (x_above, x) = x[..segment.rows().end].split_at_mut(segment.first);
         if segment.is_root() {
-            dense::factor(segment.size, own, x);
+            dense::factor(segment.size, entries, x);
         } else {
             let path = pattern.path(block, segment.first);
-            of_size!(segment.size, eliminate(above, own, &path, x_above, x));
+            of_size!(segment.size, eliminate(above, entries, &path, x_above, x));
         }
     }
     for segment in pattern.segments(block) {
-        let own = &a[segment.range()];
+        let entries = &a[segment.range()];
         let (x_above, x) = x[..segment.rows().end].split_at_mut(segment.first);
         if segment.is_root() {
-            dense::forward(segment.size, own, x);
+            dense::forward(segment.size, entries, x);
         } else {
             let path = pattern.path(block, segment.first).rows;
-            of_size!(segment.size, forward(own, path, x_above, x));
+            of_size!(segment.size, forward(entries, path, x_above, x));
         }
     }
 }
 
 /// The rows of a segment with `path` ancestors.
 #[inline(always)]
-fn split<F, const S: usize>(mut own: &mut [F], path: usize) -> [&mut [F]; S] {
+fn split<F, const S: usize>(mut entries: &mut [F], path: usize) -> [&mut [F]; S] {
     let mut rows = [(); S].map(|()| <&mut [F]>::default());
     for (k, row) in rows.iter_mut().enumerate() {
-        let (head, rest) = own.split_at_mut(path + k + 1);
-        (*row, own) = (head, rest);
+        let (head, rest) = entries.split_at_mut(path + k + 1);
+        (*row, entries) = (head, rest);
     }
     rows
 }
@@ -81,13 +81,13 @@ fn split<F, const S: usize>(mut own: &mut [F], path: usize) -> [&mut [F]; S] {
 #[inline(always)]
 fn eliminate<F: Num, const S: usize>(
     above: &mut [F],
-    own: &mut [F],
+    entries: &mut [F],
     path: &Path<'_>,
     x_above: &mut [F],
     x: &mut [F],
 ) {
     let length = path.rows.len();
-    let mut segment = Removed::<F, S>::new(own, length, x);
+    let mut segment = Removed::<F, S>::new(entries, length, x);
     for i in (UNROLLED..length).rev() {
         let target = &mut above[path.starts[i]..path.starts[i] + i + 1];
         segment.subtract_from(target, &mut x_above[path.rows[i]]);
@@ -108,8 +108,8 @@ pub(super) struct Removed<'a, F, const S: usize> {
 impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
     /// From the rows' scalars and the count of their ancestors.
     #[inline(always)]
-    pub fn new(own: &'a mut [F], length: usize, x: &mut [F]) -> Self {
-        let mut rows = split::<F, S>(own, length);
+    pub fn new(entries: &'a mut [F], length: usize, x: &mut [F]) -> Self {
+        let mut rows = split::<F, S>(entries, length);
         // 1/D on the diagonal, L below it
         let mut l = [[F::c(0.0); S]; S];
         let mut y = [F::c(0.0); S];
@@ -162,14 +162,14 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
             share[k] = rows[k][last] * share[k];
         }
         // of one length, so that the loop has no check
-        let mut own: [&[F]; S] = [&[]; S];
+        let mut leading: [&[F]; S] = [&[]; S];
         for k in 0..S {
-            own[k] = &rows[k][..target.len()];
+            leading[k] = &rows[k][..target.len()];
         }
         for j in 0..target.len() {
             let mut entry = target[j];
             for k in (0..S).rev() {
-                entry = share[k].fnma(own[k][j], entry);
+                entry = share[k].fnma(leading[k][j], entry);
             }
             target[j] = entry;
         }
@@ -195,20 +195,25 @@ fn subtract<F: Num, const S: usize, const I: usize>(
 /// The rows of a segment of `path` ancestors, to read: their entries with the ancestors, all of one length, and those among
 /// themselves.
 #[inline(always)]
-fn split_ref<F: Num, const S: usize>(mut own: &[F], path: usize) -> ([&[F]; S], [[F; S]; S]) {
-    let mut rows = [&own[..0]; S];
+fn split_ref<F: Num, const S: usize>(mut entries: &[F], path: usize) -> ([&[F]; S], [[F; S]; S]) {
+    let mut rows = [&entries[..0]; S];
     let mut corner = [[F::c(0.0); S]; S];
     for k in 0..S {
-        let (row, rest) = own.split_at(path + k + 1);
+        let (row, rest) = entries.split_at(path + k + 1);
         corner[k][..k + 1].copy_from_slice(&row[path..]);
-        (rows[k], own) = (&row[..path], rest);
+        (rows[k], entries) = (&row[..path], rest);
     }
     (rows, corner)
 }
 
 #[inline(always)]
-pub(super) fn forward<F: Num, const S: usize>(own: &[F], path: &[usize], above: &[F], x: &mut [F]) {
-    let (rows, corner) = split_ref::<F, S>(own, path.len());
+pub(super) fn forward<F: Num, const S: usize>(
+    entries: &[F],
+    path: &[usize],
+    above: &[F],
+    x: &mut [F],
+) {
+    let (rows, corner) = split_ref::<F, S>(entries, path.len());
     let mut y = [F::c(0.0); S];
     y.copy_from_slice(x);
     for (j, &i) in path.iter().enumerate() {
@@ -228,13 +233,13 @@ pub(super) fn forward<F: Num, const S: usize>(own: &[F], path: &[usize], above: 
 #[inline(always)]
 pub(super) fn multiply<F: Num>(pattern: &Pattern, block: &Block, a: &[F], x: &[F], y: &mut [F]) {
     for segment in pattern.segments(block) {
-        let own = &a[segment.range()];
+        let entries = &a[segment.range()];
         if segment.is_root() {
             let rows = segment.rows();
-            dense::multiply(segment.size, own, &x[rows.clone()], &mut y[rows]);
+            dense::multiply(segment.size, entries, &x[rows.clone()], &mut y[rows]);
         } else {
             let path = pattern.path(block, segment.first).rows;
-            of_size!(segment.size, add_rows(own, path, segment.first, x, y));
+            of_size!(segment.size, add_rows(entries, path, segment.first, x, y));
         }
     }
 }
@@ -243,13 +248,13 @@ pub(super) fn multiply<F: Num>(pattern: &Pattern, block: &Block, a: &[F], x: &[F
 /// loaded and stored once for all of them.
 #[inline(always)]
 pub(super) fn add_rows<F: Num, const S: usize>(
-    own: &[F],
+    entries: &[F],
     path: &[usize],
     first: usize,
     x: &[F],
     y: &mut [F],
 ) {
-    let (rows, corner) = split_ref::<F, S>(own, path.len());
+    let (rows, corner) = split_ref::<F, S>(entries, path.len());
     let mut x_own = [F::c(0.0); S];
     x_own.copy_from_slice(&x[first..first + S]);
     let mut y_own = [F::c(0.0); S];
