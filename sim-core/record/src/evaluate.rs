@@ -272,7 +272,7 @@ impl Interpreter<'_> {
 
     fn where_holds(&self, mask: Operand, active: Active) -> Active {
         let lanes = each(active).filter(|&lane| self.operand(mask, lane) != 0.0);
-        lanes.fold(0, |found, lane| found | 1 << lane)
+        lanes.fold(0, |holding, lane| holding | 1 << lane)
     }
 
     fn address(&self, cell: &Cell, lane: usize) -> usize {

@@ -139,11 +139,11 @@ impl Sharer<'_> {
         let mut inside = Vec::new();
         let mut of_lane = HashMap::new();
         for name in sums {
-            let own = *self.names as u32;
+            let lane_name = *self.names as u32;
             *self.names += 1;
-            of_lane.insert(*name, own);
+            of_lane.insert(*name, lane_name);
             inside.push(Statement::Var {
-                name: own,
+                name: lane_name,
                 value: Operand::number(0.0),
             });
         }
@@ -154,8 +154,8 @@ impl Sharer<'_> {
             body,
         });
         for name in sums {
-            let own = of_lane[name];
-            let mut added = Operand::Value(self.compute(Op::Get(own), &mut inside));
+            let lane_name = of_lane[name];
+            let mut added = Operand::Value(self.compute(Op::Get(lane_name), &mut inside));
             let mut apart = 1;
             while apart < self.lanes {
                 let other = self.compute(Op::AcrossLanes(added, apart), &mut inside);
@@ -182,14 +182,14 @@ impl Sharer<'_> {
             match statement {
                 Statement::Let(number) => {
                     if let Op::Get(name) = &mut self.values[*number as usize]
-                        && let Some(own) = of_lane.get(name)
+                        && let Some(lane_name) = of_lane.get(name)
                     {
-                        *name = *own;
+                        *name = *lane_name;
                     }
                 }
                 Statement::Set { name, .. } => {
-                    if let Some(own) = of_lane.get(name) {
-                        *name = *own;
+                    if let Some(lane_name) = of_lane.get(name) {
+                        *name = *lane_name;
                     }
                 }
                 Statement::When { body, .. }

@@ -57,7 +57,7 @@ impl Graph {
         for (k, statement) in body.iter().enumerate() {
             let mut needs = BTreeSet::new();
             of_statement(statement, values, &mut |used| match used {
-                Use::Value(number) => found(number, values, &made, &mut needs),
+                Use::Value(number) => add_need(number, values, &made, &mut needs),
                 Use::Read(name) | Use::Change(name) => needs.extend(started.get(&name)),
                 Use::Index(_) | Use::Start(_) => {}
             });
@@ -79,7 +79,7 @@ impl Graph {
             let mut needs = BTreeSet::new();
             for output in goal {
                 if let Operand::Value(number) = recording.outputs[*output] {
-                    found(number, values, &made, &mut needs);
+                    add_need(number, values, &made, &mut needs);
                 }
             }
             let cone = graph.union(&needs, body.len());
@@ -165,14 +165,14 @@ impl Order<'_> {
 }
 
 /// Adds the statement that computes a value. One that is written where it is used may have none: then those of its operands.
-fn found(number: u32, values: &[Op], made: &HashMap<u32, usize>, needs: &mut BTreeSet<usize>) {
+fn add_need(number: u32, values: &[Op], made: &HashMap<u32, usize>, needs: &mut BTreeSet<usize>) {
     let op = &values[number as usize];
     if let Some(k) = made.get(&number) {
         needs.insert(*k);
     } else if op.is_inline() {
         op.each_operand(|x| {
             if let Operand::Value(number) = x {
-                found(number, values, made, needs);
+                add_need(number, values, made, needs);
             }
         });
     }

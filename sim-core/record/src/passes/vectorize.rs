@@ -260,7 +260,7 @@ impl Vectorizer {
         self.block(body, start)
     }
 
-    fn accesses(&self, body: &[Statement], found: &mut Accesses) {
+    fn accesses(&self, body: &[Statement], accesses: &mut Accesses) {
         let reach = |cell: &Cell| match quad_of(cell) {
             Some((quad, _)) => reach_of_quad(quad, cell),
             None => Reach::of_cell(cell),
@@ -268,14 +268,14 @@ impl Vectorizer {
         for statement in body {
             match statement {
                 Statement::Let(number) => match &self.values[*number as usize] {
-                    Op::Load(cell) => found.loads.push(reach(cell)),
-                    Op::LoadAt(cell, _) => found.loads.push(Reach::of_columns(cell)),
+                    Op::Load(cell) => accesses.loads.push(reach(cell)),
+                    Op::LoadAt(cell, _) => accesses.loads.push(Reach::of_columns(cell)),
                     _ => {}
                 },
-                Statement::Store { cell, .. } => found.stores.push(reach(cell)),
+                Statement::Store { cell, .. } => accesses.stores.push(reach(cell)),
                 Statement::When { body, .. }
                 | Statement::Push { body, .. }
-                | Statement::Loop { body, .. } => self.accesses(body, found),
+                | Statement::Loop { body, .. } => self.accesses(body, accesses),
                 _ => {}
             }
         }

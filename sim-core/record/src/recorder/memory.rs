@@ -143,7 +143,7 @@ impl State {
     }
 
     /// Sets whose rows a table holds from now on; none: rows chosen by index.
-    pub(super) fn own(&mut self, table: Table, list: Option<Owner>) {
+    pub(super) fn set_owner(&mut self, table: Table, list: Option<Owner>) {
         match list {
             Some(list) => self.owners.insert(table, list),
             None => self.owners.remove(&table),

@@ -109,7 +109,7 @@ impl Cx for Recorder {
             let zero = Operand::number(0.0);
             let values: Vec<Operand> = values.iter().map(|x| s.see(*x)).collect();
             let value = |lane: usize| values.get(lane).copied().unwrap_or(zero);
-            let mut own = value(0);
+            let mut selected = value(0);
             for lane in (1..lanes).filter(|&lane| value(lane) != value(lane - 1)) {
                 let number = s.value(Op::Lane);
                 let mask = s.value(Op::Binary(
@@ -117,9 +117,9 @@ impl Cx for Recorder {
                     Operand::number(lane as f32 - 0.5),
                     number,
                 ));
-                own = s.value(Op::Select(mask, value(lane), own));
+                selected = s.value(Op::Select(mask, value(lane), selected));
             }
-            s.handle(own)
+            s.handle(selected)
         })
     }
 
@@ -269,7 +269,7 @@ impl Cx for Recorder {
             let value = s.see(x);
             if let Some(cell) = s.cell(t, row, k) {
                 if row.owner.is_none() {
-                    s.own(t, None);
+                    s.set_owner(t, None);
                 }
                 s.store(cell, value);
             }
@@ -293,7 +293,7 @@ impl Cx for Recorder {
                 return s.refuse(Misuse::RowOfAnotherList);
             }
             if s.is_inside(t, row.end.saturating_sub(1), k) {
-                s.own(t, Some(row.owner));
+                s.set_owner(t, Some(row.owner));
                 s.store(
                     Cell {
                         table: t,

@@ -24,17 +24,17 @@ pub(super) fn private(pieces: &[Piece], values: &[Op]) -> Vec<BTreeSet<u32>> {
             });
         }
     }
-    let mut own = vec![BTreeSet::new(); pieces.len()];
+    let mut private_names = vec![BTreeSet::new(); pieces.len()];
     for (name, of) in mentions {
         let mut of = of.into_iter();
         if let (Some(p), None) = (of.next(), of.next())
             && !pieces[p].regions.is_empty()
             && is_private(name, &pieces[p], values)
         {
-            own[p].insert(name);
+            private_names[p].insert(name);
         }
     }
-    own
+    private_names
 }
 
 fn is_private(name: u32, piece: &Piece, values: &[Op]) -> bool {

@@ -76,11 +76,11 @@ fn column(memory: &[f32], k: usize) -> Vec<f32> {
 
 /// What lanes add up to: each its rows in order, then neighbours, pairs, and so on.
 fn sum_of_lanes(x: &[f32], lanes: usize) -> f32 {
-    let own = |lane: usize| {
+    let lane_sum = |lane: usize| {
         let rows = x.iter().skip(lane).step_by(lanes);
         rows.fold(0.0, |sum, x| sum + x)
     };
-    let mut sums: Vec<f32> = (0..lanes).map(own).collect();
+    let mut sums: Vec<f32> = (0..lanes).map(lane_sum).collect();
     while sums.len() > 1 {
         sums = sums.chunks(2).map(|pair| pair[0] + pair[1]).collect();
     }
@@ -246,15 +246,15 @@ fn exchanged(lanes: usize) -> Recording {
     recorded(lanes, move |cx, list, x| {
         let product = x[0] * x[1];
         let numbers: Vec<Recorded> = (0..lanes.min(4)).map(|k| c(k as f64)).collect();
-        let own = cx.own(&numbers);
-        let mut sum = cx.var(own * x[0]);
+        let lane_value = cx.own(&numbers);
+        let mut sum = cx.var(lane_value * x[0]);
         each!(cx, r in *list, {
-            let more = cx.get(&sum) + cx.load_at(TABLE, r, 0, own);
+            let more = cx.get(&sum) + cx.load_at(TABLE, r, 0, lane_value);
             cx.set(&mut sum, more);
         });
         let sum = cx.get(&sum);
         let mut results: Vec<Recorded> = (0..lanes.min(4)).map(|k| cx.of_lane(sum, k)).collect();
-        results.push(cx.max_lanes(own) + cx.sum_lanes(own));
+        results.push(cx.max_lanes(lane_value) + cx.sum_lanes(lane_value));
         results.push(product);
         results
     })

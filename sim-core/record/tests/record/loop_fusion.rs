@@ -25,8 +25,8 @@ fn list(cx: &mut Recorder, k: usize) -> <Recorder as Cx>::List {
     cx.kept(COUNTS, at, first, capacity)
 }
 
-/// Goes over three lists; `own` is what the body of one has of its own.
-fn over_lists(own: impl Fn(usize) -> f64) -> Recording {
+/// Goes over three lists; `constant` is what the body of each list adds.
+fn over_lists(constant: impl Fn(usize) -> f64) -> Recording {
     accepted(|cx, x| {
         let mut sum = cx.var(x[0]);
         for k in 0..3 {
@@ -35,7 +35,7 @@ fn over_lists(own: impl Fn(usize) -> f64) -> Recording {
                 let (a, b) = (cx.load(ROWS, r, 0), cx.load(ROWS, r, 1));
                 cx.fill(ROWS, r, 1, a * b + x[1]);
                 // no sum of three that is rounded alike in any order
-                let more = (cx.get(&sum) * c(1.1) + a).sqrt() + c(own(k));
+                let more = (cx.get(&sum) * c(1.1) + a).sqrt() + c(constant(k));
                 cx.set(&mut sum, more);
             });
         }
@@ -85,19 +85,19 @@ fn loops_of_one_body_over_several_lists_are_one_loop() {
 /// Rounds in which a variable is set and read under one mask, and added to in between.
 fn masked(reads_always: bool) -> Recording {
     let text = |cx: &mut Recorder, x: &[Recorded]| {
-        let mut own = cx.var(x[0]);
+        let mut variable = cx.var(x[0]);
         let mut sum = cx.var(x[1]);
         let rows = list(cx, 0);
         times!(cx, round in 4, {
             let at = cx.number(round);
             let mask = at.lt(x[2]);
-            when!(cx, mask, { cx.set(&mut own, at) });
+            when!(cx, mask, { cx.set(&mut variable, at) });
             each!(cx, r in rows, {
-                let more = cx.get(&own) + cx.load(ROWS, r, 0);
-                cx.set(&mut own, more);
+                let more = cx.get(&variable) + cx.load(ROWS, r, 0);
+                cx.set(&mut variable, more);
             });
             let read = |cx: &mut Recorder, sum: &mut _| {
-                let more: Recorded = cx.get(&own) * c(0.5) + cx.get(sum);
+                let more: Recorded = cx.get(&variable) * c(0.5) + cx.get(sum);
                 cx.set(sum, more);
             };
             if reads_always {

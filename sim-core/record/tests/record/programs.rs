@@ -30,17 +30,17 @@ fn constants_read_back_from_the_program_bit_for_bit() {
     });
     let recording = recording.expect("constants are recorded");
     let module = toy::validated(&wgsl(&recording, &ProgramOptions::default()));
-    let mut found = std::collections::HashSet::new();
+    let mut literals = std::collections::HashSet::new();
     for (_, expression) in module.entry_points[0].function.expressions.iter() {
         if let naga::Expression::Literal(naga::Literal::F32(x)) = expression {
-            found.insert(x.to_bits());
+            literals.insert(x.to_bits());
         }
     }
     for k in constants {
         let bits = k.to_bits();
         // a negative number may be the negation of a literal
         assert!(
-            found.contains(&bits) || found.contains(&(-k).to_bits()),
+            literals.contains(&bits) || literals.contains(&(-k).to_bits()),
             "{k:?}"
         );
     }

@@ -92,10 +92,13 @@ fn programs_in_sequence_are_scopes_that_share_their_fields() {
 #[test]
 #[should_panic(expected = "have one lane")]
 fn programs_of_several_lanes_are_not_put_in_sequence() {
-    let one = record(1, |_, x| vec![x[0] + x[0]]).unwrap();
+    let recording = record(1, |_, x| vec![x[0] + x[0]]).unwrap();
     let listed = ProgramOptions {
         is_listed: true,
         ..ProgramOptions::default()
     };
-    sequence(&[(&one, &ProgramOptions::default()), (&one, &listed)]);
+    sequence(&[
+        (&recording, &ProgramOptions::default()),
+        (&recording, &listed),
+    ]);
 }

@@ -206,17 +206,19 @@ fn the_random_shapes_of_these_tests_touch_in_every_pair_of_kinds() {
             for stage in before_integrate(m) {
                 run(stage, m, &mut block, &mut memory);
             }
-            let found = contacts(m, &memory);
+            let touching_pairs = contacts(m, &memory);
             for (kinds, count) in PAIR_KINDS.into_iter().zip(&mut touching) {
                 let group = m
                     .contacts
                     .group(kinds)
                     .expect("every pair of kinds is there");
-                let touches = found.iter().any(|p| (group.first..group.end).contains(p));
+                let touches = touching_pairs
+                    .iter()
+                    .any(|p| (group.first..group.end).contains(p));
                 *count += usize::from(touches);
             }
             let couples = |&p: &usize| m.contacts.classes[m.contacts.pairs[p].class].couples;
-            coupled += usize::from(found.iter().any(couples));
+            coupled += usize::from(touching_pairs.iter().any(couples));
             left_out += usize::from(block.left_out[0] > 0.0);
         }
         println!(
