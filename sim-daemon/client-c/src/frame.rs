@@ -83,7 +83,7 @@ pub unsafe extern "C" fn tl_frame_field(
                 text(name, "name")?,
             )
         };
-        let found = frame.slot.with(STALE, |frame| {
+        let field = frame.slot.with(STALE, |frame| {
             let view = frame.field(name)?;
             Ok(Array {
                 data: view.ptr.cast(),
@@ -94,7 +94,7 @@ pub unsafe extern "C" fn tl_frame_field(
                 shape: padded(view.shape),
             })
         })?;
-        array.set(found);
+        array.set(field);
         Ok(())
     })
 }
@@ -116,7 +116,7 @@ pub unsafe extern "C" fn tl_frame_describe(
             let info = Output::new(info, nothing, "info")?;
             (info, handle(frame, "frame")?)
         };
-        let found = frame.slot.with(STALE, |frame| {
+        let described = frame.slot.with(STALE, |frame| {
             let header = frame.header();
             Ok(FrameInfo {
                 number: header.frame,
@@ -124,7 +124,7 @@ pub unsafe extern "C" fn tl_frame_describe(
                 due_next_ns: header.due_next,
             })
         })?;
-        info.set(found);
+        info.set(described);
         Ok(())
     })
 }
