@@ -80,8 +80,8 @@ impl Mark {
                     continue;
                 }
                 let pixel = y * TILE + x;
-                let own = (a[2] + foot * (b[2] - a[2])) * (1.0 + SLACK);
-                let open = near[pixel].iter().filter(|&&near| near <= own).count();
+                let depth = (a[2] + foot * (b[2] - a[2])) * (1.0 + SLACK);
+                let open = near[pixel].iter().filter(|&&near| near <= depth).count();
                 let shown = HIDDEN + (1.0 - HIDDEN) * open as f32 / near[pixel].len() as f32;
                 lights[pixel] = mix(lights[pixel], self.light, cover * self.opacity * shown);
             }

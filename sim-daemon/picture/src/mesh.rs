@@ -357,8 +357,8 @@ fn is_closed(corners: &[[u32; 3]]) -> bool {
     }
     edges.sort_unstable();
     let (pairs, rest) = edges.as_chunks::<2>();
-    let is_pair = |&[one, other]: &[(u32, u32, bool); 2]| {
-        (one.0, one.1) == (other.0, other.1) && one.2 != other.2
+    let is_pair = |&[first, other]: &[(u32, u32, bool); 2]| {
+        (first.0, first.1) == (other.0, other.1) && first.2 != other.2
     };
     !pairs.is_empty() && rest.is_empty() && pairs.iter().all(is_pair)
 }

@@ -47,15 +47,15 @@ pub(crate) fn corner_normals(vertices: &[Vector], triangles: &[[u32; 3]]) -> Vec
         }
     }
     let at_corner = |facet: usize, vertex: u32| {
-        let own = unit(areas[facet]);
+        let normal = unit(areas[facet]);
         let fan = &around[start[vertex as usize]..start[vertex as usize + 1]];
         if fan.len() > FAN_MAX {
-            return own;
+            return normal;
         }
         let mut sum = [0.0; 3];
         for &other in fan {
             let area = areas[other as usize];
-            if dot(own, area) > SMOOTH * dot(area, area).sqrt() {
+            if dot(normal, area) > SMOOTH * dot(area, area).sqrt() {
                 sum = along(sum, 1.0, area);
             }
         }

@@ -59,10 +59,10 @@ pub(crate) fn draw(pixels: &mut [Rgb], surfaces: &[[Surface; 4]], width: usize) 
             index.checked_sub(width),
             (index + width < pixels.len()).then_some(index + width),
         ];
-        let own = &surfaces[index];
+        let surface = &surfaces[index];
         let is_edge = |k: &usize| {
             let mut others = beside.iter().flatten().map(|&other| &surfaces[other][*k]);
-            others.any(|other| own[*k].is_edge(other))
+            others.any(|other| surface[*k].is_edge(other))
         };
         let share = (0..4).filter(is_edge).count() as f32 / 4.0;
         if share > 0.0 {

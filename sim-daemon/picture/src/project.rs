@@ -109,8 +109,8 @@ pub(crate) fn find(chunks: &[Chunk], number: u32) -> &Triangle {
 pub(crate) fn project(placed: &[Placed], lens: &Lens, threads: usize) -> Vec<Chunk> {
     let mut cuts = vec![0];
     let mut faces = 0;
-    for (index, one) in placed.iter().enumerate() {
-        faces += one.level().faces.len();
+    for (index, placed_mesh) in placed.iter().enumerate() {
+        faces += placed_mesh.level().faces.len();
         if faces >= WORK || index + 1 == placed.len() {
             cuts.push(index + 1);
             faces = 0;
@@ -131,19 +131,19 @@ fn chunk(placed: &[Placed], range: std::ops::Range<usize>, lens: &Lens) -> Chunk
     let mut triangles = Vec::new();
     let mut places = Vec::new();
     for index in range {
-        let one = &placed[index];
-        let level = one.level();
+        let placed_mesh = &placed[index];
+        let level = placed_mesh.level();
         places.clear();
         places.extend(level.vertices.iter().map(|&vertex| {
-            let ahead = transformed(&one.ahead, vertex);
+            let ahead = transformed(&placed_mesh.ahead, vertex);
             let free = !lens.perspective || is_free(&ahead, lens.nearest);
             (ahead, free.then(|| corner(lens, ahead)))
         }));
-        let number = (index as u32, one.translucent);
+        let number = (index as u32, placed_mesh.translucent);
         // as seen from outside they run clockwise, since rows count downwards
-        let turned = one.closed && !one.translucent;
-        for (face, it) in level.faces.iter().enumerate() {
-            let at = it.corners.map(|vertex| &places[vertex as usize]);
+        let turned = placed_mesh.closed && !placed_mesh.translucent;
+        for (face, facet) in level.faces.iter().enumerate() {
+            let at = facet.corners.map(|vertex| &places[vertex as usize]);
             let mut add = |corners: [Corner; 3]| {
                 triangles.extend(triangle(lens, corners, turned, number, face as u32));
             };

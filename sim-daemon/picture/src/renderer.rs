@@ -343,19 +343,19 @@ impl<'a> Stage<'a> {
 /// Who is seen at the samples of a pixel: each once, with its share of them, and where they lie in the middle [pixels].
 fn shares(who: &[u32; 4]) -> impl Iterator<Item = (u32, f32, [f32; 2])> {
     (0..4).filter_map(|first| {
-        let own = who[first];
-        if who[..first].contains(&own) {
+        let id = who[first];
+        if who[..first].contains(&id) {
             return None;
         }
         let (mut count, mut sum) = (0.0, [0.0; 2]);
         for k in first..4 {
-            if who[k] == own {
+            if who[k] == id {
                 count += 1.0;
                 sum = std::array::from_fn(|axis| sum[axis] + SAMPLES[k][axis] as f32);
             }
         }
         Some((
-            own,
+            id,
             0.25 * count,
             sum.map(|part| part / (count * SUB as f32)),
         ))

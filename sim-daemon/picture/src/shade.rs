@@ -162,14 +162,14 @@ impl Lights {
             normal = normal.map(|part| -part);
         }
         let [red, green, blue, opacity] = face.colour;
-        let own = mix(light([red, green, blue]), look.tint, look.tinted);
+        let surface_light = mix(light([red, green, blue]), look.tint, look.tinted);
         let opacity = look.opacity * f32::from(opacity) / 255.0;
-        (self.lit(own, normal, flat, point, ray), opacity)
+        (self.lit(surface_light, normal, flat, point, ray), opacity)
     }
 
     fn lit(
         &self,
-        own: Light,
+        surface_light: Light,
         normal: [f32; 3],
         flat: [f32; 3],
         point: [f32; 3],
@@ -192,7 +192,7 @@ impl Lights {
             0.10 * sixteen * sixteen * shadow
         };
         let amount = 0.22 + 0.24 * sky + 0.66 * key * shadow + 0.14 * fill;
-        own.map(|part| part * amount + gleam)
+        surface_light.map(|part| part * amount + gleam)
     }
 
     /// Light from behind everything: the sky.
@@ -224,7 +224,7 @@ impl Lights {
         if left <= 0.0 {
             return behind;
         }
-        let mut own = behind.map(|part| FLOOR * part);
+        let mut colour = behind.map(|part| FLOOR * part);
         for axis in 0..2 {
             // a pixel's width along this axis [lines]
             let pixel = length(right[axis] - point[axis], below[axis] - point[axis]);
@@ -242,11 +242,11 @@ impl Lights {
                 (LINE, 1.0)
             };
             let cover = (width - distance).clamp(0.0, 1.0) * dense;
-            own = mix(own, line, 0.8 * cover);
+            colour = mix(colour, line, 0.8 * cover);
         }
         let at = [point[0], point[1], ground.height];
         let shadow = self.shadow.light(at, [0.0, 0.0, 1.0]);
-        let lit = own.map(|part| part * (0.52 + 0.48 * shadow));
+        let lit = colour.map(|part| part * (0.52 + 0.48 * shadow));
         mix(behind, lit, left)
     }
 }

@@ -131,11 +131,11 @@ fn what_is_nearer_hides_what_is_behind_in_any_order() {
     let near = at(0, [0.4, -0.3, 0.2]);
     let far = at(1, [0.0; 3]);
     let meshes = || vec![ball(0.25, 24, RED), ball(0.25, 24, BLUE)];
-    let one = drawn(meshes(), &shot(&[near, far]));
+    let first = drawn(meshes(), &shot(&[near, far]));
     let other = drawn(meshes(), &shot(&[far, near]));
-    assert_eq!(one, other);
-    let (reds, _) = spot(&one, is_red);
-    let (blues, _) = spot(&one, is_blue);
+    assert_eq!(first, other);
+    let (reds, _) = spot(&first, is_red);
+    let (blues, _) = spot(&first, is_blue);
     assert!(reds > 1000.0 && blues == 0.0, "{reds} {blues}");
 }
 
@@ -160,9 +160,9 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
         renderer.add(ball(0.2, 16, BLUE));
         renderer.render(&shot)
     };
-    let one = render(1);
+    let expected = render(1);
     for threads in [2, 3, 16] {
-        assert!(one == render(threads), "{threads} threads");
+        assert!(expected == render(threads), "{threads} threads");
     }
 }
 
