@@ -350,12 +350,12 @@ impl ProtocolError {
     /// A transport failure; `problem` is the transport's own error, which often does not know the cause.
     pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
         let action = action.into();
-        let found = take_problem().or_else(other_problem);
-        let system = match found {
+        let cause = take_problem().or_else(other_problem);
+        let system = match cause {
             Some(Problem::System(error)) => Some(io::Error::from(error)),
             _ => None,
         };
-        match found {
+        match cause {
             Some(Problem::Full {
                 folder,
                 free,

@@ -420,9 +420,9 @@ impl Client {
     pub fn observers(&self, hook: Hook<'_>) -> Result<usize, ProtocolError> {
         self.check_process()?;
         // an observer that only counts registers no reader
-        let own = usize::from(self.observer.take(hook)?.is_some());
+        let registered = usize::from(self.observer.take(hook)?.is_some());
         let all = self.connection.ports(hook, transport::watchers)?;
-        Ok(all.saturating_sub(own))
+        Ok(all.saturating_sub(registered))
     }
 
     fn with_observer<T>(

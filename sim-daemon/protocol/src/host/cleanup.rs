@@ -68,12 +68,12 @@ impl ClientCleanup {
         self.completed.insert(dead);
         let file = format!("{}node.details", self.config.global.prefix);
         let nodes = self.folder().join("nodes");
-        let theirs = nodes.join(dead.to_string());
+        let dead_node = nodes.join(dead.to_string());
         // what fails here is tried again
-        let _ = std::fs::create_dir_all(&theirs);
+        let _ = std::fs::create_dir_all(&dead_node);
         let _ = std::fs::copy(
             nodes.join(self.node.to_string()).join(&file),
-            theirs.join(&file),
+            dead_node.join(&file),
         );
     }
 
@@ -88,8 +88,8 @@ impl ClientCleanup {
     /// has files, and removing a file that somebody still maps changes nothing.
     fn remove_orphans(&mut self) {
         // a folder that cannot be read tells nothing of its files
-        let found = orphans(&self.folder(), &self.completed).unwrap_or_default();
-        let mut again: Vec<_> = found.intersection(&self.orphans).collect();
+        let orphans = orphans(&self.folder(), &self.completed).unwrap_or_default();
+        let mut again: Vec<_> = orphans.intersection(&self.orphans).collect();
         // what a folder holds comes after it
         again.sort_unstable();
         for path in again.into_iter().rev() {
@@ -98,6 +98,6 @@ impl ClientCleanup {
         let nodes = self.folder().join("nodes");
         self.completed
             .retain(|node| nodes.join(node.to_string()).exists());
-        self.orphans = found;
+        self.orphans = orphans;
     }
 }

@@ -200,9 +200,10 @@ impl Host {
         }
         let next = self.waiter.wait(&self.listener, &mut self.state)?;
         if next == Next::Command {
-            let (theirs, affinity) = (self.state.inbox.header().core, &mut self.state.affinity);
-            let shared = affinity.core() == theirs;
-            self.waiter.share(shared && !affinity.leave(theirs));
+            let (client_core, affinity) =
+                (self.state.inbox.header().core, &mut self.state.affinity);
+            let shared = affinity.core() == client_core;
+            self.waiter.share(shared && !affinity.leave(client_core));
         }
         Ok(next)
     }
@@ -365,11 +366,11 @@ fn check(
         description.worlds * groups,
         description.frames_held
     );
-    let own = physics_bytes.saturating_add(budget::own_bytes(description) as u64);
+    let process_bytes = physics_bytes.saturating_add(budget::own_bytes(description) as u64);
     budget::check(
         budget::free(),
         budget::all_bytes(description, frame).saturating_mul(groups),
-        own.saturating_mul(groups as u64),
+        process_bytes.saturating_mul(groups as u64),
         &what,
     )
 }

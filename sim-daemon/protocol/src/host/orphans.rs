@@ -21,7 +21,7 @@ const CONTEXT: &str = "node_monitor_context";
 /// A folder could not be read, so that the owners of some files are unknown.
 pub(super) fn orphans(folder: &Path, given: &HashSet<u128>) -> std::io::Result<HashSet<PathBuf>> {
     let files = paths(folder)?;
-    let (mut tagged, mut found) = (HashSet::new(), HashSet::new());
+    let (mut tagged, mut orphans) = (HashSet::new(), HashSet::new());
     // nodes are listed after the files, so that the port of a file that is seen has its tag
     let nodes = paths(&folder.join("nodes"))?;
     let watched = watched(&nodes);
@@ -34,16 +34,16 @@ pub(super) fn orphans(folder: &Path, given: &HashSet<u128>) -> std::io::Result<H
         tagged.extend(inside.iter().flat_map(|tag| ids(tag)));
         let gone = |id| !watched.contains(&id) && (given.contains(&id) || !has_process(id));
         if ids(&path).into_iter().any(gone) {
-            found.extend(inside);
-            found.insert(path);
+            orphans.extend(inside);
+            orphans.insert(path);
         }
     }
     let is_orphan = |file: &PathBuf| {
         extension(file).is_some_and(|kind| OF_PORTS.contains(&kind))
             && ids(file).iter().any(|port| !tagged.contains(port))
     };
-    found.extend(files.into_iter().filter(is_orphan));
-    Ok(found)
+    orphans.extend(files.into_iter().filter(is_orphan));
+    Ok(orphans)
 }
 
 /// Nodes whose monitor is complete: iceoryx2 tells whether they live, and cleans up after them.

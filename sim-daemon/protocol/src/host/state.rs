@@ -73,8 +73,13 @@ impl State {
                 "{RECORDERS_MAX} recorders are at work, which is the limit; end one of them"
             ));
         }
-        let (shared, own) = Journals::bytes(&self.description, &self.frame, observed);
-        match budget::check(budget::free(), shared, own, "the journal of a recorder") {
+        let (shared, process_bytes) = Journals::bytes(&self.description, &self.frame, observed);
+        match budget::check(
+            budget::free(),
+            shared,
+            process_bytes,
+            "the journal of a recorder",
+        ) {
             Err(
                 ProtocolError::SharedMemory { free, needed, .. }
                 | ProtocolError::Memory { free, needed, .. },
@@ -389,9 +394,9 @@ impl State {
 
 impl Awaited<Next> for State {
     fn poll(&mut self) -> Result<Option<Next>, ProtocolError> {
-        let found = self.poll_commands()?;
+        let next = self.poll_commands()?;
         let is_late = || self.pacer.deadline().is_some_and(|due| clock::now() >= due);
-        Ok(found.or_else(|| is_late().then_some(Next::Late)))
+        Ok(next.or_else(|| is_late().then_some(Next::Late)))
     }
 
     fn patience(&self) -> Option<Duration> {

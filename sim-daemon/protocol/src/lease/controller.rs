@@ -89,7 +89,7 @@ impl Controller {
     ) -> Result<Controller, ProtocolError> {
         let start = Instant::now();
         // what an earlier call did not wait for may be granted yet, to nobody
-        let (own, abandoned) = (std::process::id(), &connection.abandoned);
+        let (own_pid, abandoned) = (std::process::id(), &connection.abandoned);
         let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
         loop {
             let error = match ask_for_lease(connection, hook) {
@@ -105,7 +105,7 @@ impl Controller {
                 ProtocolError::Transport { .. } => true,
                 ProtocolError::LeaseHeld { pid, .. } => {
                     process::is_gone(pid, connection.peer.beacon.pid)
-                        || was_abandoned && pid == own && start.elapsed() < ABANDONED_MAX
+                        || was_abandoned && pid == own_pid && start.elapsed() < ABANDONED_MAX
                 }
                 ProtocolError::Interrupted | ProtocolError::Timeout { .. } => {
                     abandoned.store(true, Ordering::Relaxed);

@@ -20,9 +20,9 @@ pub(crate) struct HeartbeatThread {
 impl HeartbeatThread {
     pub(crate) fn start(connection: &Arc<Connection>, epoch: u64) -> HeartbeatThread {
         let stop = Arc::new((Mutex::new(false), Condvar::new()));
-        let (connection, theirs) = (Arc::clone(connection), Arc::clone(&stop));
+        let (connection, thread_stop) = (Arc::clone(connection), Arc::clone(&stop));
         let beat = move || {
-            let (stopped, signal) = &*theirs;
+            let (stopped, signal) = &*thread_stop;
             let mut guard = lock(stopped);
             while !*guard {
                 guard = signal

@@ -169,9 +169,9 @@ pub(crate) fn holds_bytes(first: usize, bytes: usize) -> bool {
     if SLOTS[hint.load(Ordering::Relaxed)].holds(first, bytes) {
         return true;
     }
-    let found = used().iter().position(|slot| slot.holds(first, bytes));
-    hint.store(found.unwrap_or(0), Ordering::Relaxed);
-    found.is_some()
+    let place = used().iter().position(|slot| slot.holds(first, bytes));
+    hint.store(place.unwrap_or(0), Ordering::Relaxed);
+    place.is_some()
 }
 
 /// Whether any mapped file was cut.

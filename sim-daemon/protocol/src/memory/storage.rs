@@ -273,8 +273,8 @@ impl<T: Content> Builder<'_, T> {
         };
         let folder = self.config.get_path_hint().to_string();
         let file = new_file(FilePath::new(&folder), bytes as u64).map_err(failed)?;
-        let whose = (owner(&self.config), true);
-        let mapping = Mapping::new(file.file(), bytes, true, whose)
+        let ownership = (owner(&self.config), true);
+        let mapping = Mapping::new(file.file(), bytes, true, ownership)
             .map_err(|error| failed(Problem::System(error.into())))?;
         let storage = Storage {
             mapping: ManuallyDrop::new(mapping),
@@ -320,9 +320,9 @@ impl<T: Content> Builder<'_, T> {
         };
         let status = file.metadata().map_err(system)?;
         let bytes = status.len() as usize;
-        let whose = (owner(&self.config), false);
+        let ownership = (owner(&self.config), false);
         let mapping = (status.is_file() && bytes >= size_of::<Data<T>>())
-            .then(|| Mapping::new(&file, bytes, may_write, whose).map_err(system))
+            .then(|| Mapping::new(&file, bytes, may_write, ownership).map_err(system))
             .transpose()?;
         // SAFETY: the mapping is long enough, and any bits are a number.
         let whole = |mapping: &Mapping| unsafe {

@@ -63,10 +63,10 @@ impl Connection {
     ) -> Result<(Connection, Announced), ProtocolError> {
         intact_there(peer)?;
         let (sender, receiver) = mpsc::channel();
-        let theirs = peer.clone();
+        let thread_peer = peer.clone();
         let open = move || {
             // nobody waits any more for one that comes too late
-            let _ = sender.send(Connection::open_here(theirs));
+            let _ = sender.send(Connection::open_here(thread_peer));
         };
         std::thread::Builder::new()
             .name("tightloop-attach".to_owned())

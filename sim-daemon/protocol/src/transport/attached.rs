@@ -9,9 +9,9 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState, Service};
 const LISTED_MAX: usize = 8;
 
 /// The processes that are attached beside a client's own node, those first that are so most often; ends a clause.
-pub(crate) fn holders<S: Service>(own: &Node<S>) -> String {
+pub(crate) fn holders<S: Service>(client_node: &Node<S>) -> String {
     let mut clients: BTreeMap<u32, usize> = BTreeMap::new();
-    let listed = Node::<S>::list(own.config(), |node| {
+    let listed = Node::<S>::list(client_node.config(), |node| {
         let is_client = match &node {
             NodeState::Alive(alive) => {
                 (alive.details().as_ref()).is_none_or(|details| details.name().as_str() == "client")
@@ -20,7 +20,7 @@ pub(crate) fn holders<S: Service>(own: &Node<S>) -> String {
         };
         // one without a readable id belongs to nobody who could be named
         let pid = node.node_id().pid::<S>().ok();
-        if let (true, Some(pid)) = (is_client && node.node_id() != own.id(), pid) {
+        if let (true, Some(pid)) = (is_client && node.node_id() != client_node.id(), pid) {
             *clients.entry(pid.value() as u32).or_default() += 1;
         }
         CallbackProgression::Continue

@@ -66,9 +66,14 @@ pub(crate) struct Free {
     pub(crate) memory: u64,
 }
 
-/// Refuses when `shared` bytes, and 5 % for what is not counted, do not fit, or not together with `own` bytes of the
-/// process: past the end, shared memory kills instead of failing.
-pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(), ProtocolError> {
+/// Refuses when `shared` bytes, and 5 % for what is not counted, do not fit, or not together with `process_bytes` of
+/// other memory: past the end, shared memory kills instead of failing.
+pub(crate) fn check(
+    free: Free,
+    shared: usize,
+    process_bytes: u64,
+    what: &str,
+) -> Result<(), ProtocolError> {
     let needed = shared as u64 + shared as u64 / 20;
     if needed > free.shared {
         return Err(ProtocolError::SharedMemory {
@@ -78,7 +83,7 @@ pub(crate) fn check(free: Free, shared: usize, own: u64, what: &str) -> Result<(
             what: what.to_owned(),
         });
     }
-    let needed = needed.saturating_add(own);
+    let needed = needed.saturating_add(process_bytes);
     if needed > free.memory {
         return Err(ProtocolError::Memory {
             free: free.memory,

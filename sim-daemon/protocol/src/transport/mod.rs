@@ -419,11 +419,11 @@ pub(crate) fn open_wake<S: Service>(
 
 /// An attribute of an event service.
 pub(crate) fn attribute<S: Service>(service: &EventService<S>, key: &str) -> String {
-    let found = service
+    let entry = service
         .attributes()
         .iter()
         .find(|attribute| attribute.key().as_bytes() == key.as_bytes());
-    found.map_or_else(
+    entry.map_or_else(
         || "absent".to_owned(),
         |attribute| attribute.value().to_string(),
     )

@@ -78,9 +78,9 @@ impl Waiter {
     where
         Listener<S>: FileDescriptorBased,
     {
-        if let Some(found) = awaited.poll()? {
+        if let Some(value) = awaited.poll()? {
             self.learn(Duration::ZERO);
-            return Ok(found);
+            return Ok(value);
         }
         let mut start = Instant::now();
         if self.may_spin() {
@@ -94,9 +94,9 @@ impl Waiter {
                     Some(_) => {}
                 }
             }
-            if let Some(found) = self.spin(awaited)? {
+            if let Some(value) = self.spin(awaited)? {
                 self.learn(start.elapsed());
-                return Ok(found);
+                return Ok(value);
             }
             // perhaps the other side waited for our core: then the wait begins only now, and what was spun must not make
             // the next spin longer
@@ -110,20 +110,20 @@ impl Waiter {
                 }
                 // too short to sleep
                 Some(_) => {
-                    if let Some(found) = awaited.poll()? {
-                        return Ok(found);
+                    if let Some(value) = awaited.poll()? {
+                        return Ok(value);
                     }
                     std::hint::spin_loop();
                     continue;
                 }
             }
             // a notification may be an old one: only looking tells
-            if let Some(found) = awaited.poll()? {
+            if let Some(value) = awaited.poll()? {
                 self.learn(start.elapsed());
-                return Ok(found);
+                return Ok(value);
             }
-            if let Some(found) = awaited.poll_rest()? {
-                return Ok(found);
+            if let Some(value) = awaited.poll_rest()? {
+                return Ok(value);
             }
         }
     }
@@ -147,19 +147,19 @@ impl Waiter {
                 break;
             }
             park(listener, (rest - NEAR / 2).min(SLICE))?;
-            if let Some(found) = awaited.poll()? {
-                return Ok(found);
+            if let Some(value) = awaited.poll()? {
+                return Ok(value);
             }
-            if let Some(found) = awaited.poll_rest()? {
-                return Ok(found);
+            if let Some(value) = awaited.poll_rest()? {
+                return Ok(value);
             }
         }
         self.alarm.sleep_until_shortly_before(due);
         // it comes at a known time: to spin for it is not in vain, whatever was learnt about other waits
         if self.free_core && !self.shared {
             let end = Instant::now() + Duration::from_nanos(due.saturating_sub(clock::now()));
-            if let Some(found) = spin_until(end + SPIN_SURE, awaited)? {
-                return Ok(found);
+            if let Some(value) = spin_until(end + SPIN_SURE, awaited)? {
+                return Ok(value);
             }
         }
         self.wait(listener, awaited)
@@ -174,9 +174,9 @@ impl Waiter {
             (2, SPIN_MIN)
         };
         let worthwhile = (times * self.typical).clamp(least, SPIN_MAX);
-        if let Some(found) = spin_until(Instant::now() + worthwhile, awaited)? {
+        if let Some(value) = spin_until(Instant::now() + worthwhile, awaited)? {
             self.rest /= 2;
-            return Ok(Some(found));
+            return Ok(Some(value));
         }
         self.rest = (2 * self.rest).clamp(1, REST_MAX);
         self.resting = self.rest;
@@ -210,8 +210,8 @@ impl Waiter {
 fn spin_until<T>(end: Instant, awaited: &mut impl Awaited<T>) -> Result<Option<T>, ProtocolError> {
     loop {
         for _ in 0..LOOKS {
-            if let Some(found) = awaited.poll()? {
-                return Ok(Some(found));
+            if let Some(value) = awaited.poll()? {
+                return Ok(Some(value));
             }
             std::hint::spin_loop();
         }

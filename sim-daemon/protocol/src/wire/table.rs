@@ -227,15 +227,15 @@ mod tests {
 
     #[test]
     fn an_array_comes_once_and_one_without_columns_beside_it() {
-        let of = |columns: [usize; 2]| {
+        let read = |columns: [usize; 2]| {
             let array = |columns| ("joint_f".to_owned(), Dtype::F32, vec![3, columns], 0);
             let table = Table::lay_out(columns.map(array));
             let mut payload = vec![0; table.total_bytes() / 8];
             payload[..table.words().len()].copy_from_slice(table.words());
             Table::parse(&payload, 2)
         };
-        assert!(of([0, 9]).is_ok() && of([9, 0]).is_ok() && of([0, 0]).is_ok());
-        assert_eq!(of([9, 9]).unwrap_err(), "joint_f comes twice");
+        assert!(read([0, 9]).is_ok() && read([9, 0]).is_ok() && read([0, 0]).is_ok());
+        assert_eq!(read([9, 9]).unwrap_err(), "joint_f comes twice");
     }
 
     #[test]

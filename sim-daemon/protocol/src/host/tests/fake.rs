@@ -167,8 +167,8 @@ impl Fake {
         let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
         let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
         let (stop, (ready, wait)) = (Arc::new(AtomicBool::new(false)), channel());
-        let theirs = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || serve(&paths, theirs, ready, takes));
+        let thread_stop = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || serve(&paths, thread_stop, ready, takes));
         wait.recv().unwrap();
         Fake {
             name: "fake".to_owned(),

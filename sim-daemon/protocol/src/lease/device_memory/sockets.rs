@@ -62,16 +62,16 @@ impl Door {
 
     /// The connection that has named this lease. All others that wait are closed.
     pub(crate) fn visitor(&self, epoch: u64) -> Result<UnixStream, String> {
-        let mut found = Err("its holder has not connected".to_owned());
+        let mut visitor = Err("its holder has not connected".to_owned());
         while let Ok((stream, _)) = self.0.accept() {
             match admitted(stream, rustix::process::geteuid(), epoch) {
-                Ok(Some(stream)) => found = Ok(stream),
+                Ok(Some(stream)) => visitor = Ok(stream),
                 Ok(None) => {}
-                Err(reason) if found.is_err() => found = Err(reason),
+                Err(reason) if visitor.is_err() => visitor = Err(reason),
                 Err(_) => {}
             }
         }
-        found
+        visitor
     }
 }
 
@@ -79,9 +79,9 @@ impl Door {
 fn admitted(mut stream: UnixStream, user: Uid, epoch: u64) -> Result<Option<UnixStream>, String> {
     let peer = socket_peercred(&stream).map_err(|error| format!("its user is unknown: {error}"))?;
     if peer.uid != user {
-        let (theirs, ours) = (peer.uid.as_raw(), user.as_raw());
+        let (peer_user, daemon_user) = (peer.uid.as_raw(), user.as_raw());
         return Err(format!(
-            "process {} belongs to user {theirs}, the daemon to user {ours}; run both as one user",
+            "process {} belongs to user {peer_user}, the daemon to user {daemon_user}; run both as one user",
             peer.pid.as_raw_nonzero()
         ));
     }
@@ -199,8 +199,8 @@ mod tests {
     /// A client and the daemon's end, which has read what the client named.
     fn visit_of(epoch: u64) -> (UnixStream, UnixStream) {
         let (client, daemon) = pair(epoch);
-        let own = rustix::process::geteuid();
-        let daemon = admitted(daemon, own, epoch).unwrap();
+        let user = rustix::process::geteuid();
+        let daemon = admitted(daemon, user, epoch).unwrap();
         (client, daemon.expect("it named this lease"))
     }
 
@@ -219,19 +219,19 @@ mod tests {
 
     #[test]
     fn another_user_is_refused_by_name_and_another_lease_gets_nothing() {
-        let own = rustix::process::geteuid();
-        let other = Uid::from_raw(own.as_raw() + 1);
+        let user = rustix::process::geteuid();
+        let other = Uid::from_raw(user.as_raw() + 1);
         let refused = admitted(pair(7).1, other, 7).unwrap_err();
         let told = format!(
             "belongs to user {}, the daemon to user {}",
-            own.as_raw(),
+            user.as_raw(),
             other.as_raw()
         );
         assert!(refused.contains(&told), "{refused}");
-        assert!(admitted(pair(7).1, own, 7).unwrap().is_some());
-        assert!(admitted(pair(7).1, own, 8).unwrap().is_none());
+        assert!(admitted(pair(7).1, user, 7).unwrap().is_some());
+        assert!(admitted(pair(7).1, user, 8).unwrap().is_none());
         let (_silent, daemon) = UnixStream::pair().unwrap();
-        assert!(admitted(daemon, own, 7).unwrap().is_none());
+        assert!(admitted(daemon, user, 7).unwrap().is_none());
     }
 
     #[test]
