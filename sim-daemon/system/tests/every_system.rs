@@ -60,24 +60,24 @@ fn the_clock_goes_on_and_a_sleep_does_not_end_early() {
 
 #[test]
 fn a_process_is_there_until_it_ends_and_tells_its_age_and_memory() {
-    let own = std::process::id();
-    assert!(process::exists(own) && !process::is_gone(own, own));
+    let pid = std::process::id();
+    assert!(process::exists(pid) && !process::is_gone(pid, pid));
     let mut ended = child();
     ended.wait().unwrap();
-    assert!(!process::exists(ended.id()) && process::is_gone(ended.id(), own));
+    assert!(!process::exists(ended.id()) && process::is_gone(ended.id(), pid));
     // nobody has asked for the exit code of this one
     let mut unasked = child();
     let mut tries = 0;
-    while !process::is_gone(unasked.id(), own) && tries < 500 {
+    while !process::is_gone(unasked.id(), pid) && tries < 500 {
         std::thread::sleep(Duration::from_millis(20));
         tries += 1;
     }
-    assert!(process::is_gone(unasked.id(), own));
+    assert!(process::is_gone(unasked.id(), pid));
     unasked.wait().unwrap();
-    let age = process::age(own).unwrap();
+    let age = process::age(pid).unwrap();
     assert!(age < Duration::from_secs(3600), "{age:?}");
-    let all = process::memory(own).unwrap();
-    assert!(all > 100_000 && process::memory_shared(own).is_none_or(|shared| shared < all));
+    let all = process::memory(pid).unwrap();
+    assert!(all > 100_000 && process::memory_shared(pid).is_none_or(|shared| shared < all));
     assert_eq!(process::missing(), None);
 }
 
@@ -167,8 +167,8 @@ fn a_core_that_is_not_there_is_refused_and_a_request_to_stop_is_heard() {
     assert!(!flag.load(std::sync::atomic::Ordering::Relaxed));
     #[cfg(unix)]
     {
-        let own = rustix::process::Pid::from_raw(std::process::id() as i32).unwrap();
-        rustix::process::kill_process(own, rustix::process::Signal::TERM).unwrap();
+        let pid = rustix::process::Pid::from_raw(std::process::id() as i32).unwrap();
+        rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
         // another thread may handle it
         let heard = || flag.load(std::sync::atomic::Ordering::Relaxed);
         let until = clock::now() + 5_000_000_000;

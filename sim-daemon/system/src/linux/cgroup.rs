@@ -57,7 +57,7 @@ fn mount(root: &Path, line: &str) -> Option<Mount> {
     let mut kind = kind.split(' ');
     let version = match (kind.next()?, kind.nth(1)) {
         ("cgroup2", _) => &V2,
-        ("cgroup", Some(options)) if options.split(',').any(|one| one == "memory") => &V1,
+        ("cgroup", Some(options)) if options.split(',').any(|option| option == "memory") => &V1,
         _ => return None,
     };
     let mut place = place.split(' ').skip(3);
@@ -75,7 +75,12 @@ fn group(line: &str) -> Option<(&'static Files, &str)> {
     let (number, controllers, group) = (parts.next()?, parts.next()?, parts.next()?);
     match controllers {
         "" if number == "0" => Some((&V2, group)),
-        _ if controllers.split(',').any(|one| one == "memory") => Some((&V1, group)),
+        _ if controllers
+            .split(',')
+            .any(|controller| controller == "memory") =>
+        {
+            Some((&V1, group))
+        }
         _ => None,
     }
 }

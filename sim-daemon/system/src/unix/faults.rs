@@ -27,19 +27,19 @@ pub unsafe fn replace_missing_pages(on_missing_page: OnMissingPage) {
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     // one crate asks for it, always with the same function
     let _ = ON_MISSING_PAGE.set(on_missing_page);
-    let ours = on_bus_error as *const () as usize;
+    let handler = on_bus_error as *const () as usize;
     // SAFETY: zero is a value of this plain struct, and the handler does only what a handler may.
     unsafe {
         let mut present: libc::sigaction = std::mem::zeroed();
         libc::sigaction(libc::SIGBUS, std::ptr::null(), &raw mut present);
-        if present.sa_sigaction == ours {
+        if present.sa_sigaction == handler {
             return;
         }
         // never freed: a handler may be reading the one before
         PREVIOUS.store(Box::into_raw(Box::new(present)), Ordering::Release);
         HANDED_ON.store(false, Ordering::Release);
         let mut action: libc::sigaction = std::mem::zeroed();
-        action.sa_sigaction = ours;
+        action.sa_sigaction = handler;
         action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK;
         libc::sigaction(libc::SIGBUS, &raw const action, null_mut());
     }

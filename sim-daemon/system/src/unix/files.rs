@@ -90,8 +90,8 @@ pub fn is_nameless(file: &Metadata) -> bool {
 /// # Errors
 /// Those of the system.
 pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    let (ours, there) = (file.metadata()?, fs::metadata(path));
-    Ok(there.is_ok_and(|there| (there.ino(), there.dev()) == (ours.ino(), ours.dev())))
+    let (metadata, there) = (file.metadata()?, fs::metadata(path));
+    Ok(there.is_ok_and(|there| (there.ino(), there.dev()) == (metadata.ino(), metadata.dev())))
 }
 
 /// Reads from a place of a file that others may hold a lock of.

@@ -9,7 +9,7 @@ use std::os::fd::AsFd;
 /// # Errors
 /// It was closed.
 pub fn stdout() -> io::Result<File> {
-    own(io::stdout())
+    to_file(io::stdout())
 }
 
 /// Standard error past its lock, which others would wait for.
@@ -17,9 +17,9 @@ pub fn stdout() -> io::Result<File> {
 /// # Errors
 /// It was closed.
 pub fn stderr() -> io::Result<File> {
-    own(io::stderr())
+    to_file(io::stderr())
 }
 
-fn own(stream: impl AsFd) -> io::Result<File> {
+fn to_file(stream: impl AsFd) -> io::Result<File> {
     Ok(File::from(stream.as_fd().try_clone_to_owned()?))
 }

@@ -106,8 +106,8 @@ pub fn is_nameless(_file: &Metadata) -> bool {
 /// # Errors
 /// Those of the system.
 pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    let ours = same_file::Handle::from_file(file.try_clone()?)?;
-    Ok(same_file::Handle::from_path(path).is_ok_and(|there| there == ours))
+    let handle = same_file::Handle::from_file(file.try_clone()?)?;
+    Ok(same_file::Handle::from_path(path).is_ok_and(|there| there == handle))
 }
 
 /// Reads from a place of a file that others may hold a lock of.
