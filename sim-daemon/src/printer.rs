@@ -60,12 +60,12 @@ impl Printer {
     pub(crate) fn start(target: impl Write + Send + 'static) -> Result<Printer, DaemonError> {
         let (queue, items) = std::sync::mpsc::sync_channel(QUEUE);
         let dropped = Arc::new(AtomicU64::new(0));
-        let theirs = Arc::clone(&dropped);
+        let counter = Arc::clone(&dropped);
         std::thread::Builder::new()
             .name("tightloop-printer".to_owned())
             .spawn(move || {
                 signals::keep_writing_in_the_background();
-                print(target, &items, &theirs);
+                print(target, &items, &counter);
             })
             .map_err(|error| DaemonError::System {
                 action: "start a thread",

@@ -52,14 +52,14 @@ fn text(bytes: &[u8]) -> String {
 fn a_standing_box_has_four_contacts_and_a_solver() {
     let done = bench("json", &["--json"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
-    let found: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert!(found["steps_per_s"].as_f64().unwrap() > 0.0);
-    assert_eq!(found["worlds"], 11);
-    assert_eq!(found["faulted"], 0);
-    let mean = |count: &str| found["counts"][count]["mean"].as_f64().unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(report["steps_per_s"].as_f64().unwrap() > 0.0);
+    assert_eq!(report["worlds"], 11);
+    assert_eq!(report["faulted"], 0);
+    let mean = |count: &str| report["counts"][count]["mean"].as_f64().unwrap();
     assert_eq!((mean("contacts"), mean("rows")), (4.0, 12.0));
     assert!(mean("iterations") >= 1.0 && mean("block_iterations") >= mean("iterations"));
-    let stages = found["stages"].as_array().unwrap();
+    let stages = report["stages"].as_array().unwrap();
     let time = |name: &str| {
         let stage = stages.iter().find(|stage| stage["stage"] == name);
         stage.unwrap_or_else(|| panic!("{name}"))["step_ns"]
@@ -71,15 +71,15 @@ fn a_standing_box_has_four_contacts_and_a_solver() {
         .map(|stage| stage["step_ns"].as_f64().unwrap())
         .sum();
     assert!(time("plane_box") > 0.0 && time("solver") > 0.0);
-    assert!(times <= found["total_ns"].as_f64().unwrap());
+    assert!(times <= report["total_ns"].as_f64().unwrap());
 }
 
 #[test]
 fn f64_has_one_world_a_block_and_no_masked_lanes() {
     let done = bench("double", &["--json", "--precision", "f64"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
-    let found: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    let mean = |count: &str| found["counts"][count]["mean"].as_f64().unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    let mean = |count: &str| report["counts"][count]["mean"].as_f64().unwrap();
     assert_eq!(mean("block_iterations"), mean("iterations"));
 }
 

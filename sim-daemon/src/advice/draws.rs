@@ -28,7 +28,7 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
 
 /// Draws of starts that look like degrees.
 fn starts(robot: &Robot) -> Option<String> {
-    let mut found = Vec::new();
+    let mut large = Vec::new();
     for joint in moving(robot) {
         let dofs = match joint.kind {
             JointKind::Revolute => 0..joint.dofs.len(),
@@ -38,7 +38,7 @@ fn starts(robot: &Robot) -> Option<String> {
         let offsets = joint.dofs[dofs].iter().filter_map(|dof| dof.offset_q);
         let most = offsets.map(|offset| spread(&offset)).fold(0.0, f64::max);
         if most > TAU {
-            found.push(format!("`{}` by up to {most}", joint.name));
+            large.push(format!("`{}` by up to {most}", joint.name));
         }
     }
     let kind = if robot.urdf.is_some() {
@@ -46,11 +46,11 @@ fn starts(robot: &Robot) -> Option<String> {
     } else {
         "body"
     };
-    (!found.is_empty()).then(|| {
+    (!large.is_empty()).then(|| {
         format!(
             "{kind} `{}`: a reset moves {}, which looks like degrees: angles are in radians, and np.radians converts degrees.",
             robot.name,
-            some(&found)
+            some(&large)
         )
     })
 }
@@ -58,14 +58,14 @@ fn starts(robot: &Robot) -> Option<String> {
 /// Noise of angles that looks like degrees.
 fn noise(scene: &Description) -> Option<String> {
     let noises = [Param::JointQNoise, Param::JointTargetQNoise];
-    let mut found = Vec::new();
+    let mut noisy = Vec::new();
     for (param, ranges) in noises
         .iter()
         .filter_map(|param| scene.param_ranges.get_key_value(param))
     {
         for (name, drawn) in ranges.iter().filter(|(_, drawn)| spread(drawn) > PI) {
             if turns(scene, name) {
-                found.push(format!(
+                noisy.push(format!(
                     "{} of `{name}` of up to {}",
                     param.row().name,
                     spread(drawn)
@@ -73,10 +73,10 @@ fn noise(scene: &Description) -> Option<String> {
             }
         }
     }
-    (!found.is_empty()).then(|| {
+    (!noisy.is_empty()).then(|| {
         format!(
             "randomize: {} looks like degrees: angles are in radians, and np.radians converts degrees.",
-            some(&found)
+            some(&noisy)
         )
     })
 }
@@ -86,14 +86,14 @@ fn turns(scene: &Description, name: &str) -> bool {
     let (robot, joint) = name.split_once('/').unwrap_or((name, ""));
     let mut robots = scene.robots.iter().filter(|other| other.name == robot);
     robots.any(|robot| {
-        let mut own = moving(robot).filter(|own| joint.is_empty() || own.name == joint);
-        own.any(|joint| joint.kind == JointKind::Revolute)
+        let mut joints = moving(robot).filter(|moved| joint.is_empty() || moved.name == joint);
+        joints.any(|joint| joint.kind == JointKind::Revolute)
     })
 }
 
 /// Draws of masses of which many are below the least, which they then become: such links are thrown about.
 fn masses(scene: &Description) -> Option<String> {
-    let mut found = Vec::new();
+    let mut light = Vec::new();
     for (param, ranges) in [Param::BodyMass, Param::BodyMassScale]
         .iter()
         .filter_map(|param| scene.param_ranges.get_key_value(param))
@@ -106,15 +106,15 @@ fn masses(scene: &Description) -> Option<String> {
                 Distribution::Normal { mean, std } => mean - DEVIATIONS * std <= least,
             };
             if is_low {
-                found.push(format!("{} of `{name}` is often {least}", param.row().name));
+                light.push(format!("{} of `{name}` is often {least}", param.row().name));
             }
         }
     }
-    (!found.is_empty()).then(|| {
+    (!light.is_empty()).then(|| {
         format!(
             "randomize: {}, since draws below become that: a link with so little mass is thrown about. Use a smaller standard \
              deviation, or Uniform with a low above 0.",
-            some(&found)
+            some(&light)
         )
     })
 }

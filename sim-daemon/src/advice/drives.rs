@@ -84,8 +84,8 @@ pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
     for robot in &scene.robots {
         let mut names = Vec::new();
         for joint in moving(robot) {
-            let own = first..first + joint.dofs.len();
-            first = own.end;
+            let range = first..first + joint.dofs.len();
+            first = range.end;
             let swings = |(dof, weight): (&JointDof, &f64)| {
                 let inertia = if *weight > 0.0 { weight.recip() } else { 0.0 };
                 dof.target_ke > 0.0
@@ -95,7 +95,7 @@ pub(super) fn swinging(scene: &Description, model: &Model) -> Vec<String> {
                     && dof.friction <= HELD * dof.target_ke
                     && dof.effort_limit != Some(0.0)
             };
-            if robot.precompiled.is_none() && joint.dofs.iter().zip(&weights[own]).any(swings) {
+            if robot.precompiled.is_none() && joint.dofs.iter().zip(&weights[range]).any(swings) {
                 names.push(format!("`{}`", joint.name));
             }
         }
@@ -128,14 +128,14 @@ pub(super) fn unstable(scene: &Description, model: &Model) -> Vec<String> {
     for robot in &scene.robots {
         let (mut names, mut shortest) = (Vec::new(), f64::INFINITY);
         for joint in moving(robot) {
-            let own = first..first + joint.dofs.len();
-            first = own.end;
+            let range = first..first + joint.dofs.len();
+            first = range.end;
             let is_simple = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic);
             // what MuJoCo compiled has actuators of its own, and a follower moves its leader's inertia
             if !is_simple || robot.precompiled.is_some() || is_coupled(robot, joint) {
                 continue;
             }
-            for (dof, weight) in joint.dofs.iter().zip(&weights[own]) {
+            for (dof, weight) in joint.dofs.iter().zip(&weights[range]) {
                 let is_held = dof.target_mode != TargetMode::Velocity && dof.target_ke > 0.0;
                 if !is_held || *weight <= 0.0 || !weight.is_finite() {
                     continue;

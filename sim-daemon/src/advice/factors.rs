@@ -28,21 +28,21 @@ pub(super) fn advice(scene: &Description, model: &Model) -> Vec<String> {
                 continue;
             }
             told.push(*distribution);
-            let own = drawn_values(model, param, distribution);
-            if !is_factor(param, distribution, &own) {
+            let values = drawn_values(model, param, distribution);
+            if !is_factor(param, distribution, &values) {
                 continue;
             }
             let names = ranges.iter().filter(|(_, other)| *other == distribution);
             let names: Vec<String> = names.map(|(name, _)| format!("`{name}`")).collect();
-            all.push(sentence(param, distribution, &names, &own));
+            all.push(sentence(param, distribution, &names, &values));
         }
     }
     all
 }
 
 /// Whether the draws of a gravity or another parameter are reported as factors.
-pub(super) fn is_told(param: Param, distribution: &Distribution, own: f64) -> bool {
-    is_factor(param, distribution, &[own])
+pub(super) fn is_told(param: Param, distribution: &Distribution, value: f64) -> bool {
+    is_factor(param, distribution, &[value])
 }
 
 /// The model's values, without 0, that a distribution replaces.
@@ -64,7 +64,7 @@ fn drawn_values(model: &Model, param: Param, distribution: &Distribution) -> Vec
         .collect()
 }
 
-fn is_factor(param: Param, distribution: &Distribution, own: &[f64]) -> bool {
+fn is_factor(param: Param, distribution: &Distribution, values: &[f64]) -> bool {
     if !replaces(param) {
         return false;
     }
@@ -83,9 +83,9 @@ fn is_factor(param: Param, distribution: &Distribution, own: &[f64]) -> bool {
         }
     };
     if is_near_1 {
-        return own.iter().any(is_beside);
+        return values.iter().any(is_beside);
     }
-    param != Param::ShapeMu && own.iter().any(|value| *value > high * FAR)
+    param != Param::ShapeMu && values.iter().any(|value| *value > high * FAR)
 }
 
 /// Whether a draw replaces a value of the model that is other than 0 or 1 as a rule.
@@ -107,9 +107,9 @@ fn replaces(param: Param) -> bool {
     )
 }
 
-fn sentence(param: Param, distribution: &Distribution, names: &[String], own: &[f64]) -> String {
+fn sentence(param: Param, distribution: &Distribution, names: &[String], draws: &[f64]) -> String {
     let row = param.row();
-    let [least, most] = own
+    let [least, most] = draws
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| {
             [least.min(*x), most.max(*x)]

@@ -13,10 +13,10 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
     if !has_moving(scene) {
         return Vec::new();
     }
-    own(scene).into_iter().chain(drawn(scene)).collect()
+    constant(scene).into_iter().chain(drawn(scene)).collect()
 }
 
-fn own(scene: &Description) -> Option<String> {
+fn constant(scene: &Description) -> Option<String> {
     let gravity @ [x, y, z] = scene.gravity;
     let shown = format!("gravity is ({x}, {y}, {z})");
     let largest = gravity.into_iter().map(f64::abs).fold(0.0, f64::max);

@@ -20,8 +20,8 @@ pub(super) fn advice(scene: &Description) -> Vec<String> {
         };
         for collision in &root.collisions {
             if matches!(collision.shape, Shape::Plane) {
-                let own = collision.name.as_deref().unwrap_or("plane");
-                let name = format!("`{own}` of `{}`", robot.name);
+                let shape_name = collision.name.as_deref().unwrap_or("plane");
+                let name = format!("`{shape_name}` of `{}`", robot.name);
                 planes.push((name, robot.pose.mul(&collision.pose)));
             }
         }

@@ -56,8 +56,8 @@ fn deep_pairs(scene: &Description, model: &Arc<Model>) -> Option<Vec<String>> {
             .filter(|robot| robot.precompiled.is_some());
         models.any(|robot| Some(robot.name.as_str()) == owner)
     };
-    let found = distances.iter().zip(pairs.as_chunks().0).take(count);
-    for (&distance, &pair) in found {
+    let contacts = distances.iter().zip(pairs.as_chunks().0).take(count);
+    for (&distance, &pair) in contacts {
         if distance > -DEPTH || pair.into_iter().all(is_geom) {
             continue;
         }

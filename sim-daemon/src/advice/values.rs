@@ -92,8 +92,8 @@ fn turned_shapes(robot: &Robot) -> Vec<String> {
     });
     shapes
         .filter_map(|(link, index, shape)| {
-            let own = shape.name.clone().unwrap_or_else(|| index.to_string());
-            let what = format!("shape `{}/{}/{own}`", robot.name, link.name);
+            let label = shape.name.clone().unwrap_or_else(|| index.to_string());
+            let what = format!("shape `{}/{}/{label}`", robot.name, link.name);
             turned(&what, &shape.pose)
         })
         .collect()
@@ -120,7 +120,7 @@ fn degrees(robot: &Robot, what: &str) -> Option<String> {
 
 /// Joints that start far outside of their limits. A follower starts where its leader puts it.
 fn outside(robot: &Robot, what: &str) -> Option<String> {
-    let mut found = Vec::new();
+    let mut outside_joints = Vec::new();
     let (mut is_large, mut follows) = (false, false);
     for joint in moving(robot) {
         let (Some([lower, upper]), [q]) = (joint.range, joint.q.as_slice()) else {
@@ -134,13 +134,13 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
             is_large |= is_angle && q.abs() > TAU;
             follows |= joint.mimic.is_some();
             let unit = if is_angle { "rad" } else { "m" };
-            found.push(format!(
+            outside_joints.push(format!(
                 "`{}` at {q:.4} {unit} ({lower:.4} to {upper:.4})",
                 joint.name
             ));
         }
     }
-    (!found.is_empty()).then(|| {
+    (!outside_joints.is_empty()).then(|| {
         let cure = match (is_large, follows) {
             (_, true) => "Limits and leaders will push against each other: mend <mimic> or <limit> in the file.",
             (true, false) => "Angles are in radians: np.radians converts degrees.",
@@ -148,7 +148,7 @@ fn outside(robot: &Robot, what: &str) -> Option<String> {
         };
         format!(
             "{what} starts far outside of joint limits: {}. {cure}",
-            some(&found)
+            some(&outside_joints)
         )
     })
 }

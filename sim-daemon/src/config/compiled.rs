@@ -26,11 +26,11 @@ impl SceneFile {
         let mut names = names.into_iter();
         let fixed: Vec<Value> = (description.shapes.iter())
             .zip(&mut names)
-            .map(|(own, name)| shape(&name, &own.pose, &own.shape))
+            .map(|(fixed_shape, name)| shape(&name, &fixed_shape.pose, &fixed_shape.shape))
             .collect();
         let mut first = [0, 0];
         let robots: Vec<Value> = (description.robots.iter())
-            .map(|own| robot(own, &mut names, &mut first))
+            .map(|described| robot(described, &mut names, &mut first))
             .collect();
         let solver = &description.solver;
         let start = model.start();
@@ -59,18 +59,18 @@ impl SceneFile {
 }
 
 /// A robot; its shapes take the next names, its joints the next dofs and coordinates.
-fn robot(own: &Robot, names: &mut impl Iterator<Item = String>, first: &mut [usize; 2]) -> Value {
+fn robot(robot: &Robot, names: &mut impl Iterator<Item = String>, first: &mut [usize; 2]) -> Value {
     let mut links = Vec::new();
-    for index in own.link_order() {
-        let link: &Link = &own.links[index];
-        let carrying = own.joints.iter().find(|joint| joint.child == index);
+    for index in robot.link_order() {
+        let link: &Link = &robot.links[index];
+        let carrying = robot.joints.iter().find(|joint| joint.child == index);
         let shapes: Vec<Value> = (link.collisions.iter())
             .zip(&mut *names)
             .map(|(collision, name)| shape(&name, &collision.pose, &collision.shape))
             .collect();
         links.push(json!({
             "name": link.name,
-            "joint": carrying.map(|joint| joint_of(own, joint, first)),
+            "joint": carrying.map(|joint| joint_of(robot, joint, first)),
             "inertial": link.inertial.as_ref().map(|inertial| json!({
                 "mass": inertial.mass, "pos": inertial.pos, "inertia": inertial.inertia,
             })),
@@ -78,10 +78,10 @@ fn robot(own: &Robot, names: &mut impl Iterator<Item = String>, first: &mut [usi
         }));
     }
     json!({
-        "name": own.name,
-        "pos": own.pose.pos,
-        "quat": own.pose.quat,
-        "from_mujoco": own.precompiled.is_some(),
+        "name": robot.name,
+        "pos": robot.pose.pos,
+        "quat": robot.pose.quat,
+        "from_mujoco": robot.precompiled.is_some(),
         "links": links,
     })
 }
@@ -208,7 +208,10 @@ fn pairs(model: &Model) -> Vec<Value> {
     let d_max = constants.contact_impedance.d_max;
     let piece = |solid: usize| {
         let shape = contacts.solids[solid].shape;
-        let first = contacts.solids.iter().position(|own| own.shape == shape);
+        let first = contacts
+            .solids
+            .iter()
+            .position(|other| other.shape == shape);
         [shape, solid - first.unwrap_or(solid)]
     };
     (0..contacts.pairs.len())

@@ -83,7 +83,7 @@ impl<T: Copy> PerDof<T> {
                 .iter()
                 .map(|&driven| if driven { value(*all) } else { else_ })
                 .collect(),
-            PerDof::Each(each) => each.iter().map(|&one| value(one)).collect(),
+            PerDof::Each(each) => each.iter().map(|&entry| value(entry)).collect(),
         }
     }
 }

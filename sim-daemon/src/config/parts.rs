@@ -50,11 +50,11 @@ impl SceneFile {
                 .map(|link| &robot.links[link])
             {
                 let place = Place::on_link(robot, &link.name);
-                let own = self.own_shapes(robot, link);
+                let own_shapes = self.own_shapes(robot, link);
                 for (index, collision) in link.collisions.iter().enumerate() {
                     let name = names.next().unwrap_or_default();
                     let (pose, shape) = (&collision.pose, &collision.shape);
-                    drawing.collision(&place, &name, pose, shape, index >= own);
+                    drawing.collision(&place, &name, pose, shape, index >= own_shapes);
                 }
             }
         }
@@ -70,8 +70,8 @@ impl SceneFile {
         if robot.urdf.is_none() && robot.precompiled.is_none() {
             return 0;
         }
-        let it = Some((robot.name.as_str(), link.name.as_str()));
-        let added = self.shapes.iter().filter(|shape| shape.link() == it);
+        let place = Some((robot.name.as_str(), link.name.as_str()));
+        let added = self.shapes.iter().filter(|shape| shape.link() == place);
         link.collisions.len() - added.count()
     }
 
@@ -79,30 +79,30 @@ impl SceneFile {
         // robots from files come first, in the order of their tables, then models
         let (robots, models) = description.robots.split_at(self.robots.len());
         for (table, robot) in self.robots.iter().zip(robots) {
-            let found = Robot::visuals(base_dir.join(&table.urdf), &table.options(base_dir));
-            self.robot_visuals(robot, found, drawing);
+            let visuals = Robot::visuals(base_dir.join(&table.urdf), &table.options(base_dir));
+            self.robot_visuals(robot, visuals, drawing);
         }
         for (table, robot) in self.mujoco.iter().zip(models) {
-            let found = Robot::mujoco_visuals(base_dir.join(&table.model));
-            self.robot_visuals(robot, found, drawing);
+            let visuals = Robot::mujoco_visuals(base_dir.join(&table.model));
+            self.robot_visuals(robot, visuals, drawing);
         }
     }
 
     fn robot_visuals(
         &self,
         robot: &Robot,
-        found: Result<Visuals, ModelError>,
+        visuals: Result<Visuals, ModelError>,
         drawing: &mut Drawing,
     ) {
         let name = &robot.name;
-        match found {
-            Ok(found) => {
-                let notes = found.notes.into_iter();
+        match visuals {
+            Ok(visuals) => {
+                let notes = visuals.notes.into_iter();
                 drawing
                     .notes
                     .extend(notes.map(|note| format!("robot `{name}`: {note}")));
                 let mut counts = HashMap::new();
-                for visual in &found.visuals {
+                for visual in &visuals.visuals {
                     let count = counts.entry(visual.link.clone()).or_insert(0);
                     drawing.visual(robot, visual, *count);
                     *count += 1;
@@ -196,8 +196,8 @@ impl Drawing {
 
     /// Adds a visual, the `index`th of its link.
     fn visual(&mut self, robot: &Robot, visual: &Visual, index: usize) {
-        let own = visual.name.clone().unwrap_or_else(|| index.to_string());
-        let name = format!("{}/{}/{own}", robot.name, visual.link);
+        let label = visual.name.clone().unwrap_or_else(|| index.to_string());
+        let name = format!("{}/{}/{label}", robot.name, visual.link);
         let mut part = Place::on_link(robot, &visual.link).part("visual", &name, &visual.pose);
         part["mesh"] = Value::Null;
         part["color"] = json!(visual.color);

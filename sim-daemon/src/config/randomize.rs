@@ -181,9 +181,9 @@ impl<'a> Culprit<'a> {
     fn dofs_of_joints(self, scene: &mut Description) -> Result<Vec<&mut JointDof>, ConfigError> {
         let (robot, rest) = self.robot(scene)?;
         // followers start where their leaders do, free joints are bodies
-        let own = |joint: &Joint| joint.kind != JointKind::Free && joint.mimic.is_none();
+        let is_drawn = |joint: &Joint| joint.kind != JointKind::Free && joint.mimic.is_none();
         let Some(rest) = rest else {
-            let joints = robot.joints.iter_mut().filter(|joint| own(joint));
+            let joints = robot.joints.iter_mut().filter(|joint| is_drawn(joint));
             let dofs: Vec<_> = joints.flat_map(|joint| &mut joint.dofs).collect();
             if dofs.is_empty() {
                 let problem =
@@ -206,12 +206,12 @@ impl<'a> Culprit<'a> {
                 None => None,
             }
         };
-        let found = robot
+        let named = robot
             .joints
             .iter()
             .enumerate()
             .find_map(|(index, joint)| Some((index, means(joint)?)));
-        let Some((index, dofs)) = found.filter(|(_, dofs)| !dofs.is_empty()) else {
+        let Some((index, dofs)) = named.filter(|(_, dofs)| !dofs.is_empty()) else {
             let names = robot.moving_joints().into_iter();
             let known = some(names.map(|joint| &robot.joints[joint].name));
             let problem = format!("there is no moving joint `{rest}`; there are: {known}");
@@ -237,7 +237,7 @@ impl<'a> Culprit<'a> {
         let all: Vec<usize> = (0..robot.joints.len())
             .filter(|&joint| free(&robot.joints[joint]))
             .collect();
-        let found = match (rest, &all[..]) {
+        let index = match (rest, &all[..]) {
             (None, [only]) => Some(*only),
             (None, _) => None,
             (Some(rest), all) => all
@@ -245,7 +245,7 @@ impl<'a> Culprit<'a> {
                 .copied()
                 .find(|&joint| robot.joints[joint].name == rest),
         };
-        let Some(found) = found else {
+        let Some(index) = index else {
             let known = all.iter().map(|&joint| &robot.joints[joint].name);
             let problem = match all.len() {
                 0 => "it does not move freely; leave it out, or let it float".to_owned(),
@@ -253,7 +253,7 @@ impl<'a> Culprit<'a> {
             };
             return Err(self.error(problem));
         };
-        Ok(&mut robot.joints[found])
+        Ok(&mut robot.joints[index])
     }
 }
 

@@ -163,7 +163,7 @@ pub(crate) fn description(
                 actuators: [robot.actuators.start, robot.actuators.end],
                 is_mujoco: {
                     let mut models = info.scene.robots.iter();
-                    models.any(|own| own.name == robot.name && own.precompiled.is_some())
+                    models.any(|model| model.name == robot.name && model.precompiled.is_some())
                 },
             })
             .collect(),
@@ -269,11 +269,11 @@ fn angle_range(scene: &Scene) -> Vec<Option<[f64; 2]>> {
         for joint in robot.moving_joints() {
             let joint = &robot.joints[joint];
             let turns = joint.kind == JointKind::Revolute;
-            let own = joint.range.filter(|range| {
+            let limits = joint.range.filter(|range| {
                 let is_finite = range.iter().all(|end| end.is_finite());
                 turns && is_finite
             });
-            ranges.resize(ranges.len() + joint.dofs.len(), own);
+            ranges.resize(ranges.len() + joint.dofs.len(), limits);
         }
     }
     ranges

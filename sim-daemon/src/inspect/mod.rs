@@ -126,8 +126,8 @@ fn refused(args: &Inspect, contents: &MujocoContents, name: &str) -> DaemonError
     let file = &args.file;
     let said = match args.json {
         true => {
-            let (file, own) = (file.to_string_lossy(), mujoco::json(contents));
-            let document = json!({ "name": name, "file": file, "mujoco": own });
+            let (file, mujoco_contents) = (file.to_string_lossy(), mujoco::json(contents));
+            let document = json!({ "name": name, "file": file, "mujoco": mujoco_contents });
             format!("{document:#}\n")
         }
         false => {

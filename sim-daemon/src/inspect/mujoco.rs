@@ -35,8 +35,8 @@ pub(super) fn head(contents: &MujocoContents, name: &str, file: &Path) -> String
     let [dofs, coords] = contents.dofs;
     line("Dofs", format!("{dofs}, {}", count(coords, "coordinate")));
     line("Mass", format!("{} kg", short(contents.mass)));
-    let found = tally(contents.geoms.iter().map(|geom| geom.kind.as_str()));
-    let named = found.iter().map(|(kind, n)| kinds(*n, kind));
+    let tallied = tally(contents.geoms.iter().map(|geom| geom.kind.as_str()));
+    let named = tallied.iter().map(|(kind, n)| kinds(*n, kind));
     let touching = contents.geoms.iter().filter(|geom| geom.is_active).count();
     let geoms = with_kinds(contents.geoms.len(), named);
     line("Geoms", format!("{geoms}; {touching} may touch"));
@@ -63,14 +63,14 @@ pub(super) fn head(contents: &MujocoContents, name: &str, file: &Path) -> String
 
 /// How many there are, of which kinds.
 fn listed(elements: &[MujocoElement]) -> String {
-    let found = tally(elements.iter().map(|element| element.kind.as_str()));
-    let named = found.iter().map(|(kind, n)| format!("{n} {kind}"));
+    let tallied = tally(elements.iter().map(|element| element.kind.as_str()));
+    let named = tallied.iter().map(|(kind, n)| format!("{n} {kind}"));
     with_kinds(elements.len(), named)
 }
 
 /// Tables of what a model has beyond its tree, each followed by an empty line; `name` is the model's.
 pub(super) fn tables(contents: &MujocoContents, name: &str) -> String {
-    let own = |element: &MujocoElement| format!("{name}/{}", element.name);
+    let full_name = |element: &MujocoElement| format!("{name}/{}", element.name);
     let on = |element: &MujocoElement| match element.on.is_empty() {
         true => NONE.to_owned(),
         false => element.on.join(", "),
@@ -78,7 +78,7 @@ pub(super) fn tables(contents: &MujocoContents, name: &str) -> String {
     let mut text = String::new();
     let actuators = contents.actuators.iter().map(|actuator| {
         let ranges = [actuator.range, actuator.force_range].map(range);
-        [own(actuator), actuator.kind.clone(), on(actuator)]
+        [full_name(actuator), actuator.kind.clone(), on(actuator)]
             .into_iter()
             .chain(ranges)
             .collect()
@@ -94,19 +94,19 @@ pub(super) fn tables(contents: &MujocoContents, name: &str) -> String {
             _ => format!("{first} to {}", last - 1),
         };
         first = last;
-        vec![own(sensor), sensor.kind.clone(), on(sensor), columns]
+        vec![full_name(sensor), sensor.kind.clone(), on(sensor), columns]
     });
     let heading = ["sensor", "kind", "of", "columns"];
     text += &table("Sensors (columns of `sensordata`)", &heading, sensors);
     let tendons = contents.tendons.iter().map(|tendon| {
         let kind = tendon.kind.clone();
-        vec![own(tendon), kind, range(tendon.range)]
+        vec![full_name(tendon), kind, range(tendon.range)]
     });
     text += &table("Tendons", &["tendon", "kind", "range"], tendons);
     let equalities = contents.equalities.iter().map(|equality| {
         let active = if equality.is_active { "yes" } else { "no" };
         let kind = equality.kind.clone();
-        vec![own(equality), kind, on(equality), active.to_owned()]
+        vec![full_name(equality), kind, on(equality), active.to_owned()]
     });
     let heading = ["equality", "kind", "of", "active"];
     text += &table("Equalities", &heading, equalities);

@@ -124,11 +124,11 @@ impl<'a> Properties<'a> {
     /// Whether nothing moves a link.
     fn is_fixed(&self, link: usize) -> bool {
         let mut link = Some(link);
-        while let Some(own) = link {
-            if self.joints(own).any(Joint::moves) {
+        while let Some(current) = link {
+            if self.joints(current).any(Joint::moves) {
                 return false;
             }
-            link = self.joint(own).and_then(|joint| joint.parent);
+            link = self.joint(current).and_then(|joint| joint.parent);
         }
         true
     }
@@ -175,14 +175,14 @@ pub(super) fn kinds(number: usize, kind: &str) -> String {
 
 /// How often each word comes, in the order in which they come first.
 pub(super) fn tally<'a>(words: impl Iterator<Item = &'a str>) -> Vec<(&'a str, usize)> {
-    let mut found: Vec<(&str, usize)> = Vec::new();
+    let mut tallied: Vec<(&str, usize)> = Vec::new();
     for word in words {
-        match found.iter_mut().find(|(other, _)| *other == word) {
+        match tallied.iter_mut().find(|(other, _)| *other == word) {
             Some((_, count)) => *count += 1,
-            None => found.push((word, 1)),
+            None => tallied.push((word, 1)),
         }
     }
-    found
+    tallied
 }
 
 /// A number, and what it consists of.

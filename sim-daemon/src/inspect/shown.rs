@@ -77,14 +77,21 @@ pub(super) fn drawing(
 /// Collision shapes of the robot, and those around it: terrain, and what the world of a MuJoCo model has.
 fn collisions(properties: &Properties, poses: &[Pose], args: &Inspect) -> [Vec<Drawn>; 2] {
     let robot = properties.robot;
-    let [mut own, mut around] = [Vec::new(), Vec::new()];
+    let [mut of_robot, mut around] = [Vec::new(), Vec::new()];
     for (place, (&link, pose)) in properties.order.iter().zip(poses).enumerate() {
         let is_world = robot.precompiled.is_some() && properties.joint(link).is_none();
         // a plane has no end; the picture has a floor of its own
         let shapes = &robot.links[link].collisions;
-        for collision in shapes.iter().filter(|own| own.shape != Shape::Plane) {
+        for collision in shapes
+            .iter()
+            .filter(|collision| collision.shape != Shape::Plane)
+        {
             let is_around = is_world || matches!(collision.shape, Shape::HeightField(_));
-            let list = if is_around { &mut around } else { &mut own };
+            let list = if is_around {
+                &mut around
+            } else {
+                &mut of_robot
+            };
             let frame = pose.mul(&collision.pose);
             let mut draw = |surface| list.push((place as u32, frame, surface));
             match &collision.shape {
@@ -93,7 +100,7 @@ fn collisions(properties: &Properties, poses: &[Pose], args: &Inspect) -> [Vec<D
             }
         }
     }
-    [own, around]
+    [of_robot, around]
 }
 
 /// At which joint positions the robot is drawn.
@@ -108,9 +115,9 @@ fn configuration(properties: &Properties, args: &Inspect) -> String {
     };
     match properties.outside_range().as_slice() {
         [] => {}
-        [one] => caption += &format!(", outside the range of {one}"),
-        [one, rest @ ..] => {
-            caption += &format!(", outside the ranges of {one} and {} more", rest.len());
+        [joint] => caption += &format!(", outside the range of {joint}"),
+        [joint, rest @ ..] => {
+            caption += &format!(", outside the ranges of {joint} and {} more", rest.len());
         }
     }
     caption

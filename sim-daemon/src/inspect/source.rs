@@ -19,9 +19,9 @@ pub(super) fn exported(args: &Inspect) -> Option<&Path> {
     let is_exported = args
         .file
         .extension()
-        .is_some_and(|own| own == "safetensors");
-    let own = is_exported.then_some(args.file.as_path());
-    args.exported.as_deref().or(own)
+        .is_some_and(|ending| ending == "safetensors");
+    let exported = is_exported.then_some(args.file.as_path());
+    args.exported.as_deref().or(exported)
 }
 
 /// Endings of meshes, which are shown as a body of water.

@@ -62,16 +62,16 @@ fn head(properties: &Properties, file: &Path) -> String {
         _ => format!(", of which {merged} are merged into the link they are fixed to"),
     };
     line("Links", links);
-    let found = tally(robot.joints.iter().map(joint_type));
-    let named = found.iter().map(|(kind, n)| format!("{n} {kind}"));
+    let tallied = tally(robot.joints.iter().map(joint_type));
+    let named = tallied.iter().map(|(kind, n)| format!("{n} {kind}"));
     line("Joints", with_kinds(robot.joints.len(), named));
     let coords = count(properties.coords(), "coordinate");
     line("Dofs", format!("{}, {coords}", properties.dofs()));
     line("Mass", format!("{} kg", short(properties.mass())));
     let shapes = robot.links.iter().flat_map(|link| &link.collisions);
-    let found = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
-    let all = found.iter().map(|(_, count)| count).sum();
-    let named = found.iter().map(|(kind, n)| kinds(*n, kind));
+    let tallied = tally(shapes.map(|collision| Shape::kind(&collision.shape)));
+    let all = tallied.iter().map(|(_, count)| count).sum();
+    let named = tallied.iter().map(|(kind, n)| kinds(*n, kind));
     let mut shapes = with_kinds(all, named);
     if all == 0 {
         shapes += ", so the picture shows the frames of the links";
@@ -130,8 +130,8 @@ fn small_hulls(robot: &Robot) -> Vec<(String, f64)> {
             .hulls
             .iter()
             .fold(0.0, |most: f64, hull| most.max(hull.error));
-        let own = mesh.notes.iter().filter(|note| note.ends_with(HULL_NOTE));
-        own.map(move |note| (format!("{} {note}", mesh.path.display()), error))
+        let hull_notes = mesh.notes.iter().filter(|note| note.ends_with(HULL_NOTE));
+        hull_notes.map(move |note| (format!("{} {note}", mesh.path.display()), error))
     });
     errors.filter(|(_, error)| *error <= SMALL_ERROR).collect()
 }

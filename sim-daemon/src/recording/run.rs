@@ -107,15 +107,15 @@ impl Run {
             .map_err(|error| failed(error.to_string()))?;
         if model.hash() != daemon.model_hash {
             let (then, now) = (daemon.model_hash, model.hash());
-            let ours = env!("CARGO_PKG_VERSION");
-            let cause = match daemon.release == ours {
+            let release = env!("CARGO_PKG_VERSION");
+            let cause = match daemon.release == release {
                 true => {
                     "a robot file or a mesh of its scene has changed since; put back what it was"
                         .to_owned()
                 }
                 false => format!(
                     "a robot file or a mesh of its scene has changed since, or release {} makes another of it than \
-                     ours, {ours}; replay it with that one",
+                     ours, {release}; replay it with that one",
                     daemon.release
                 ),
             };
@@ -175,9 +175,10 @@ impl Run {
             watch_worlds: 1,
         };
         // what commands may have follows from the model, whatever the head says
-        let own = export::description(simulation.model(), &options, simulation.layout(), info);
+        let description =
+            export::description(simulation.model(), &options, simulation.layout(), info);
         Ok(Run {
-            inbox: Inbox::for_commands_of(&own),
+            inbox: Inbox::for_commands_of(&description),
             mask: Vec::with_capacity(daemon.worlds),
             simulation,
             has_state: false,

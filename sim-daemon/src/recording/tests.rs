@@ -145,11 +145,11 @@ fn file(test: &str) -> PathBuf {
 
 /// Blocks that can be read, and how reading ends.
 fn read(bytes: &[u8]) -> Result<(Vec<Vec<u64>>, Next), String> {
-    let (mut blocks, mut found, mut block) = (Blocks::open(bytes)?, Vec::new(), Vec::new());
+    let (mut blocks, mut whole_blocks, mut block) = (Blocks::open(bytes)?, Vec::new(), Vec::new());
     loop {
         match blocks.next(&mut block).unwrap() {
-            Next::Block => found.push(block.clone()),
-            next => return Ok((found, next)),
+            Next::Block => whole_blocks.push(block.clone()),
+            next => return Ok((whole_blocks, next)),
         }
     }
 }

@@ -187,16 +187,16 @@ fn parse(bytes: &[u8]) -> Option<Result<(Question, &str, Vec<Vec<f64>>), String>
 /// The answer.
 fn rows(coords: usize, joint_q: &[f64], solutions: &[Solution]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(8 * (coords + 5) * solutions.len());
-    for (k, one) in solutions.iter().enumerate() {
-        let found = [
-            f64::from(u8::from(one.is_solved)),
-            one.position_error,
-            one.rotation_error,
-            f64::from(one.iterations),
-            f64::from(one.restarts),
+    for (k, solution) in solutions.iter().enumerate() {
+        let results = [
+            f64::from(u8::from(solution.is_solved)),
+            solution.position_error,
+            solution.rotation_error,
+            f64::from(solution.iterations),
+            f64::from(solution.restarts),
         ];
         let q = &joint_q[k * coords..(k + 1) * coords];
-        for number in q.iter().chain(&found) {
+        for number in q.iter().chain(&results) {
             bytes.extend_from_slice(&number.to_le_bytes());
         }
     }

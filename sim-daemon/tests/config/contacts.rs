@@ -251,11 +251,11 @@ fn what_contacts_cannot_have_is_refused_by_name() {
 fn mesh_summary_tells_what_touches() {
     let folder = Folder::new("mesh");
     let file = folder.0.join("wedge.obj");
-    let of = |scale| config::mesh_summary(&file, scale, &config::MeshOptions::default());
-    let summary = of([2.0; 3]).unwrap();
+    let summary_at = |scale| config::mesh_summary(&file, scale, &config::MeshOptions::default());
+    let summary = summary_at([2.0; 3]).unwrap();
     assert_eq!(summary["hull_vertices"], serde_json::json!([4]));
     assert_eq!(summary["closed"], true);
     assert_eq!(summary["extent"][1], serde_json::json!([2.0, 2.0, 2.0]));
-    let message = of([1e-9; 3]).unwrap_err().to_string();
+    let message = summary_at([1e-9; 3]).unwrap_err().to_string();
     assert_says(&message, &["wedge.obj", "mend the scale"]);
 }

@@ -46,16 +46,16 @@ fn exchanged(from: &str, to: &str) -> String {
 #[test]
 fn ranges_become_those_of_the_description_and_vary() {
     let described = parse(SCENE).describe(&assets()).unwrap();
-    let of = |param, name| described.param_ranges[&param][name];
+    let range = |param, name| described.param_ranges[&param][name];
     assert_eq!(
-        of(Param::Gravity, "z"),
+        range(Param::Gravity, "z"),
         Distribution::Normal {
             mean: -9.81,
             std: 0.1
         }
     );
     assert_eq!(
-        of(Param::ShapeMu, "cube/0"),
+        range(Param::ShapeMu, "cube/0"),
         Distribution::Uniform {
             low: 0.1,
             high: 1.0

@@ -132,11 +132,15 @@ fn joints_are_drawn_where_they_are() {
     // 4 m apart they leave the middle empty, whichever way
     assert!(is_paper(middle("4")));
     assert!(is_paper(middle("-4")));
-    let one = inspect(
+    let drawn = inspect(
         &folder.0,
         &["a.urdf", "--joint-q", "6", "--json", "--png", "q.png"],
     );
-    assert!(one.out.contains("\"picture\": \"q.png\""), "{}", one.out);
+    assert!(
+        drawn.out.contains("\"picture\": \"q.png\""),
+        "{}",
+        drawn.out
+    );
 }
 
 #[test]

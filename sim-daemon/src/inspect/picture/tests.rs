@@ -28,14 +28,14 @@ fn shapes_are_drawn_at_their_frames_in_the_colours_of_their_links() {
         &[RED, BLUE],
     );
     let expected = [[999.9, -0.3, -0.1], [1000.6, 0.3, 0.1]];
-    for (found, expected) in solids
+    for (actual, expected) in solids
         .extent
         .as_flattened()
         .iter()
         .zip(expected.as_flattened())
     {
         // a ball's facets reach its surface only at their corners
-        assert!((found - expected).abs() < 1e-3, "{:?}", solids.extent);
+        assert!((actual - expected).abs() < 1e-3, "{:?}", solids.extent);
     }
     let points = solids.points.iter().copied();
     let [above, up] = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
@@ -65,8 +65,8 @@ fn lines_of_a_grid_are_1_2_or_5_apart() {
         (0.9, 0.1),
         (7e-4, 1e-4),
     ] {
-        let found = round_spacing(size, 12.0);
-        assert!((found / spacing - 1.0).abs() < 1e-12, "{size}: {found}");
+        let rounded = round_spacing(size, 12.0);
+        assert!((rounded / spacing - 1.0).abs() < 1e-12, "{size}: {rounded}");
     }
 }
 
