@@ -135,9 +135,9 @@ fn worlds_with_and_without_active_constraints_run_side_by_side_here() {
 fn two_threads_equal_one() {
     let model = lesson(Demo::Target).compile().unwrap();
     let seeds: Vec<usize> = (0..300).collect();
-    let one = run(&model, Demo::Target, &seeds, Lanes::Auto, 1, Precision::F32);
-    let two = run(&model, Demo::Target, &seeds, Lanes::Auto, 2, Precision::F32);
-    assert!(one == two);
+    let one_thread = run(&model, Demo::Target, &seeds, Lanes::Auto, 1, Precision::F32);
+    let two_threads = run(&model, Demo::Target, &seeds, Lanes::Auto, 2, Precision::F32);
+    assert!(one_thread == two_threads);
 }
 
 #[test]

@@ -136,8 +136,8 @@ fn steps_only(mut played: Played) -> Played {
 }
 
 /// All worlds are as in another run.
-fn all_alike(one: &Played, two: &Played, worlds: usize) -> Result<(), String> {
-    (0..worlds).try_for_each(|world| one.differs(world, two, world))
+fn all_alike(first: &Played, second: &Played, worlds: usize) -> Result<(), String> {
+    (0..worlds).try_for_each(|world| first.differs(world, second, world))
 }
 
 /// The worlds that are not masked keep their bits.
@@ -145,12 +145,12 @@ fn others_notice_nothing(seed: usize, is_poisoned: bool) -> Result<(), String> {
     let mut case = Case::new(seed)?;
     let huge = is_poisoned.then(|| case.huge());
     let (mask, plain, changed) = case.with_and_without(huge);
-    let one = steps_only(play(&case.model, &case.options, &plain)?);
-    let two = steps_only(play(&case.model, &case.options, &changed)?);
+    let first = steps_only(play(&case.model, &case.options, &plain)?);
+    let second = steps_only(play(&case.model, &case.options, &changed)?);
     let untouched = (0..mask.len()).filter(|&world| !mask[world]);
     untouched
         .into_iter()
-        .try_for_each(|world| one.differs(world, &two, world))
+        .try_for_each(|world| first.differs(world, &second, world))
 }
 
 #[test]
@@ -188,8 +188,8 @@ fn many_worlds_equal_runs_of_one_or_some_of_them_in_any_order() {
             let ops: Vec<Op> = ops.iter().map(|op| op.for_worlds(&chosen)).collect();
             let run = Run::new(&case.model, options);
             let some = play_on(run, &ops, Kept::new(), &all.restored)?;
-            for (its, &world) in chosen.iter().enumerate() {
-                all.differs(world, &some, its)
+            for (place, &world) in chosen.iter().enumerate() {
+                all.differs(world, &some, place)
                     .map_err(|why| format!("{} worlds: {why}", chosen.len()))?;
             }
         }
@@ -280,9 +280,9 @@ fn evaluations_change_nothing() {
             .iter()
             .flat_map(|op| [Op::Forward, op.clone()])
             .collect();
-        let one = steps_only(play(&case.model, &case.options, &ops)?);
-        let two = steps_only(play(&case.model, &case.options, &between)?);
-        all_alike(&one, &two, case.options.worlds)
+        let first = steps_only(play(&case.model, &case.options, &ops)?);
+        let second = steps_only(play(&case.model, &case.options, &between)?);
+        all_alike(&first, &second, case.options.worlds)
     });
 }
 
@@ -433,10 +433,10 @@ fn worlds_of_these_programs_touch_overflow_explode_and_live_on() {
         let played = play(&case.model, &case.options, &ops).unwrap();
         for (_, frame) in &played.frames {
             for world in 0..case.options.worlds {
-                let of = |field| played.counter(frame, world, field);
-                let status = of(Field::Status) as u32;
+                let counter = |field| played.counter(frame, world, field);
+                let status = counter(Field::Status) as u32;
                 shown += 1;
-                touching += usize::from(of(Field::ContactCount) > 0);
+                touching += usize::from(counter(Field::ContactCount) > 0);
                 full += usize::from(status & status::CONTACTS_LEFT_OUT != 0);
                 frozen += usize::from(status & status::FROZEN != 0);
                 lost += usize::from(status & status::NOT_FINITE != 0);

@@ -203,7 +203,7 @@ fn masses_and_armatures_act_as_those_of_a_scene() {
 }
 
 /// Numbers of each world for every parameter: near what they start from, another in every world.
-fn own(model: &Model, param: Param, seeds: &[usize]) -> Vec<f64> {
+fn numbers_near_starts(model: &Model, param: Param, seeds: &[usize]) -> Vec<f64> {
     let starts = starts(model, param);
     let mut numbers = Vec::new();
     for &seed in seeds {
@@ -234,7 +234,7 @@ fn run_own(
     play(&mut run, 0..5);
     for param in Param::ALL {
         let columns = 0..param.columns(&model.sizes());
-        let numbers = own(model, param, seeds);
+        let numbers = numbers_near_starts(model, param, seeds);
         run.sim
             .write_param(param, columns, Values::F64(&numbers), None)
             .unwrap();
@@ -279,7 +279,7 @@ fn a_masked_write_leaves_the_other_worlds_as_they_were() {
         if columns == 0 {
             continue;
         }
-        let mut numbers = own(&model, param, &(0..20).collect::<Vec<_>>());
+        let mut numbers = numbers_near_starts(&model, param, &(0..20).collect::<Vec<_>>());
         // rows outside the mask are ignored
         for world in (0..20).filter(|&world| !mask[world]) {
             numbers[world * columns] = f64::NAN;
@@ -308,7 +308,7 @@ fn a_reset_keeps_parameters_and_takes_loads_away() {
     let mut run = Run::new(&model, options(3, Precision::F64, Lanes::Auto, 1));
     for param in Param::ALL {
         let columns = 0..param.columns(&model.sizes());
-        let numbers = own(&model, param, &[4, 5, 6]);
+        let numbers = numbers_near_starts(&model, param, &[4, 5, 6]);
         run.sim
             .write_param(param, columns, Values::F64(&numbers), None)
             .unwrap();
@@ -317,7 +317,7 @@ fn a_reset_keeps_parameters_and_takes_loads_away() {
     run.sim.reset(Some(&mask), None).unwrap();
     for param in Param::ALL {
         let columns = param.columns(&model.sizes());
-        let mut expected = own(&model, param, &[4, 5, 6]);
+        let mut expected = numbers_near_starts(&model, param, &[4, 5, 6]);
         if param.is_load() {
             expected[..columns].fill(0.0);
             expected[2 * columns..].fill(0.0);

@@ -102,8 +102,8 @@ fn a_world_that_is_not_finite_is_frozen_and_the_others_keep_their_bits() {
     for (lanes, precision) in machines() {
         let sick = [0, 5, 17, 36];
         let well = run(lanes, precision, 2, &[], false);
-        let found = run(lanes, precision, 1, &sick, false);
-        for (frame, (worlds, expected)) in found.iter().zip(&well).enumerate() {
+        let frames = run(lanes, precision, 1, &sick, false);
+        for (frame, (worlds, expected)) in frames.iter().zip(&well).enumerate() {
             for world in 0..WORLDS {
                 if frame < STRUCK || !sick.contains(&world) {
                     assert_eq!(
@@ -134,12 +134,12 @@ fn a_world_that_is_not_finite_is_frozen_and_the_others_keep_their_bits() {
 fn a_frozen_world_that_is_reset_is_as_good_as_new() {
     for (lanes, precision) in machines() {
         let sick = [3, 20];
-        let found = run(lanes, precision, 1, &sick, true);
+        let frames = run(lanes, precision, 1, &sick, true);
         for world in sick {
-            let (status, state) = found[FRAMES - 2][world].split_last().unwrap();
+            let (status, state) = frames[FRAMES - 2][world].split_last().unwrap();
             assert_eq!(*status, 0f64.to_bits());
-            assert_ne!(state, &found[FRAMES - 3][world][..state.len()]);
-            assert_ne!(state, &found[FRAMES - 1][world][..state.len()]);
+            assert_ne!(state, &frames[FRAMES - 3][world][..state.len()]);
+            assert_ne!(state, &frames[FRAMES - 1][world][..state.len()]);
         }
     }
 }
@@ -247,9 +247,9 @@ fn a_world_that_is_reset_by_itself_begins_anew() {
         resets: true,
         ..Faults::default()
     };
-    let found = pushed(faults, 19);
+    let frames = pushed(faults, 19);
     let mut again = 0;
-    for (before, after) in found.iter().zip(&found[1..]) {
+    for (before, after) in frames.iter().zip(&frames[1..]) {
         for world in 0..19 {
             if before.0[world] == f64::from(status::OUT_OF_BOUNDS) {
                 assert_eq!(
@@ -259,7 +259,7 @@ fn a_world_that_is_reset_by_itself_begins_anew() {
                 );
                 // as in its first frame
                 let row = world * 6..(world + 1) * 6;
-                assert_eq!(after.2[row.clone()], found[0].2[row]);
+                assert_eq!(after.2[row.clone()], frames[0].2[row]);
                 again += 1;
             }
         }

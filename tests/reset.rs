@@ -10,9 +10,9 @@ use sim_physics::arrays::Field;
 
 /// Bits of the state of each world.
 fn bits(run: &Run) -> Vec<Vec<u64>> {
-    let of = |world| STATE.iter().flat_map(move |&field| run.get(field, world));
+    let state_of = |world| STATE.iter().flat_map(move |&field| run.get(field, world));
     (0..run.sim.worlds())
-        .map(|world| of(world).map(f64::to_bits).collect())
+        .map(|world| state_of(world).map(f64::to_bits).collect())
         .collect()
 }
 
@@ -48,9 +48,9 @@ fn a_start_is_the_same_for_any_number_of_worlds_lanes_and_threads() {
                 continue;
             }
             let mut run = Run::new(&model, options(worlds, Precision::F32, lanes, threads));
-            let found = reset(&mut run, None, Some(&[77]));
+            let started = reset(&mut run, None, Some(&[77]));
             assert!(
-                found == many[..worlds],
+                started == many[..worlds],
                 "{worlds} worlds, {lanes:?}, {threads} threads"
             );
         }

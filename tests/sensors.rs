@@ -233,7 +233,7 @@ fn the_inverse_of_a_free_body_at_its_centre_is_diagonal() {
         run.forward();
         let inverse = run.get(Field::SiteInverseJacobian, 20);
         assert_eq!(inverse.len(), 3 * 12 * 6);
-        for (k, found) in inverse.iter().enumerate() {
+        for (k, value) in inverse.iter().enumerate() {
             let (site, dof, column) = (k / 72, k / 6 % 12, k % 6);
             // in the axes of the lamp x of the world is -y, and y is x
             let entry = match (site, dof / 6) {
@@ -246,8 +246,8 @@ fn the_inverse_of_a_free_body_at_its_centre_is_diagonal() {
                 _ => 0.0,
             };
             assert!(
-                (found - entry).abs() <= roundings,
-                "{site} {dof} {column}: {found}"
+                (value - entry).abs() <= roundings,
+                "{site} {dof} {column}: {value}"
             );
         }
     }

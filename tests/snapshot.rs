@@ -199,13 +199,13 @@ fn worlds_outside_the_mask_keep_their_bits() {
         let mask: Vec<bool> = (0..WORLDS).map(|world| world % 3 == 1).collect();
         run.sim.restore(&snapshot, Some(&mask), None).unwrap();
         run.forward();
-        for (world, found) in all_bits(&run).into_iter().enumerate() {
+        for (world, bits) in all_bits(&run).into_iter().enumerate() {
             let expected = if mask[world] {
                 &old[world]
             } else {
                 &new[world]
             };
-            assert!(found == *expected, "{precision:?} {lanes:?}: world {world}");
+            assert!(bits == *expected, "{precision:?} {lanes:?}: world {world}");
         }
     }
 }
@@ -219,8 +219,8 @@ fn one_world_is_forked_into_those_of_the_mask_and_into_any_number() {
             let mask: Vec<bool> = (0..WORLDS).map(|world| world > 4).collect();
             run.sim.restore(&snapshot, Some(&mask), Some(3)).unwrap();
             run.forward();
-            let found = all_bits(&run);
-            assert!((5..WORLDS).all(|world| found[world] == found[3]) && found[4] != found[3]);
+            let forked = all_bits(&run);
+            assert!((5..WORLDS).all(|world| forked[world] == forked[3]) && forked[4] != forked[3]);
             // where there are more worlds, or fewer
             for worlds in [1, 100] {
                 let mut other = Run::new(&model, options(precision, Lanes::Auto, 2, worlds));
@@ -352,7 +352,7 @@ fn refusals_name_what_is_wrong() {
     let good = run.sim.snapshot();
     let numbers = ((good.len() - 40) / 3 - COUNTERS) / 4;
     run.step();
-    let of = |density, precision, worlds| ball(density, precision, worlds).sim.snapshot();
+    let snapshot_of = |density, precision, worlds| ball(density, precision, worlds).sim.snapshot();
     assert_eq!(
         refused(&mut run, b"<robot/>", None, None),
         Wrong::NotASnapshot
@@ -370,12 +370,12 @@ fn refusals_name_what_is_wrong() {
     let mut damaged = good.clone();
     damaged[60] ^= 4;
     assert_eq!(refused(&mut run, &damaged, None, None), Wrong::Damaged);
-    let heavy = of(500.0, Precision::F32, 3);
+    let heavy = snapshot_of(500.0, Precision::F32, 3);
     assert!(matches!(
         refused(&mut run, &heavy, None, None),
         Wrong::Model { .. }
     ));
-    let double = of(400.0, Precision::F64, 3);
+    let double = snapshot_of(400.0, Precision::F64, 3);
     // the model is the same, so the error names the precision
     let (got, expected) = (64, 32);
     assert_eq!(
@@ -389,7 +389,7 @@ fn refusals_name_what_is_wrong() {
         refused(&mut run, &halves, None, None),
         Wrong::Numbers { got, expected }
     );
-    let four = of(400.0, Precision::F32, 4);
+    let four = snapshot_of(400.0, Precision::F32, 4);
     let (got, expected) = (4, 3);
     assert_eq!(
         refused(&mut run, &four, None, None),

@@ -88,11 +88,11 @@ fn quaternions_are_unit_and_turn_as_documented() {
         pos: [0.0; 3],
         quat: [from[0], from[1], from[2], from[3]],
     };
-    let close = |found: &[f64], expected: [f64; 4]| {
+    let close = |actual: &[f64], expected: [f64; 4]| {
         let off = |(a, b): (&f64, f64)| (a - b).abs();
-        let off = found.iter().zip(expected).map(off).fold(0.0, f64::max);
+        let off = actual.iter().zip(expected).map(off).fold(0.0, f64::max);
         // some ten operations on numbers up to 1
-        assert!(off < 16.0 * f64::EPSILON, "{found:?} is not {expected:?}");
+        assert!(off < 16.0 * f64::EPSILON, "{actual:?} is not {expected:?}");
     };
     let m = model.constants();
     let mut seen = 0;

@@ -240,8 +240,8 @@ fn worlds_that_exceed_their_room_report_it_and_the_others_are_bitwise_unchanged(
                     let fits = all.get(Field::ContactCount, world)[0] <= MOST as f64;
                     let forces = [Field::BodyContactForce].into_iter().filter(|_| fits);
                     for field in [Field::JointQ, Field::JointQd].into_iter().chain(forces) {
-                        let [one, other] = [&run, &all].map(|run| run.get(field, world));
-                        assert!(one == other, "{room:?}: world {world}: {field:?}");
+                        let [first, other] = [&run, &all].map(|run| run.get(field, world));
+                        assert!(first == other, "{room:?}: world {world}: {field:?}");
                     }
                 }
             }
@@ -264,20 +264,20 @@ fn the_count_of_what_was_left_out_is_exact() {
     let mut run = started(&model, &seeds, options());
     all.forward();
     run.forward();
-    let of = |run: &Run, field, world| run.get(field, world)[0];
+    let first_value = |run: &Run, field, world| run.get(field, world)[0];
     let most = MOST as f64;
     let mut expected = Vec::new();
     for world in 0..seeds.len() {
-        expected.push((of(&all, Field::ContactCount, world) - most).max(0.0));
-        let left_out = of(&run, Field::ContactsLeftOut, world);
+        expected.push((first_value(&all, Field::ContactCount, world) - most).max(0.0));
+        let left_out = first_value(&run, Field::ContactsLeftOut, world);
         assert_eq!(left_out, expected[world], "world {world}");
-        assert!(of(&run, Field::ContactCount, world) <= most);
+        assert!(first_value(&run, Field::ContactCount, world) <= most);
     }
     // of a frame, the most of its steps and of the state it ends in
     run.step();
     for (world, start) in expected.iter().enumerate() {
-        let left_out = of(&run, Field::ContactsLeftOut, world);
-        let shown = of(&run, Field::ContactCount, world);
+        let left_out = first_value(&run, Field::ContactsLeftOut, world);
+        let shown = first_value(&run, Field::ContactCount, world);
         assert!(left_out >= *start, "world {world}");
         assert!(left_out == *start || shown == most, "world {world}");
     }

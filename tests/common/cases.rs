@@ -12,8 +12,8 @@ use std::path::Path;
 /// The repository, whichever of its crates the test is of.
 fn repository() -> &'static Path {
     let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
-    let found = folders.find(|folder| folder.join("Cargo.lock").exists());
-    found.expect("a crate of the workspace")
+    let root = folders.find(|folder| folder.join("Cargo.lock").exists());
+    root.expect("a crate of the workspace")
 }
 
 /// Substeps of a frame.

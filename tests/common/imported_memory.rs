@@ -97,8 +97,8 @@ unsafe fn mappable(instance: &ash::Instance, physical: vk::PhysicalDevice) -> u3
     // SAFETY: the instance is alive.
     let known = unsafe { instance.get_physical_device_memory_properties(physical) };
     let kinds = known.memory_types_as_slice().iter();
-    let found = kinds
+    let index = kinds
         .clone()
         .position(|kind| kind.property_flags.contains(wanted));
-    found.expect("a software driver, whose device memory can be mapped") as u32
+    index.expect("a software driver, whose device memory can be mapped") as u32
 }

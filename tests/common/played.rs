@@ -89,14 +89,20 @@ impl Played {
     }
 
     /// Bits are the same; of numbers that are none, it does not matter which.
-    fn alike(&self, field: Field, one: &[u8], two: &[u8]) -> bool {
+    fn alike(&self, field: Field, first: &[u8], second: &[u8]) -> bool {
         let is_real = field.row().dtype == FieldDtype::Real;
         let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
-        one == two || is_real && self.numbers(one).iter().zip(&self.numbers(two)).all(same)
+        first == second
+            || is_real
+                && self
+                    .numbers(first)
+                    .iter()
+                    .zip(&self.numbers(second))
+                    .all(same)
     }
 
     /// What of a world differs from a world of another run, in the frames of both and at the end.
-    pub fn differs(&self, world: usize, other: &Played, its: usize) -> Result<(), String> {
+    pub fn differs(&self, world: usize, other: &Played, other_world: usize) -> Result<(), String> {
         if self.frames.len() != other.frames.len() {
             return Err(format!(
                 "{} and {} frames",
@@ -104,32 +110,37 @@ impl Played {
                 other.frames.len()
             ));
         }
-        for (k, (one, two)) in self.frames.iter().zip(&other.frames).enumerate() {
-            let (mine, others) = (self.fields(&one.1, world), other.fields(&two.1, its));
-            for (field, bytes) in &mine {
-                let Some((_, found)) = others.iter().find(|(of, _)| of == field) else {
+        for (k, (first, second)) in self.frames.iter().zip(&other.frames).enumerate() {
+            let (fields, others) = (
+                self.fields(&first.1, world),
+                other.fields(&second.1, other_world),
+            );
+            for (field, bytes) in &fields {
+                let Some((_, other_bytes)) = others.iter().find(|(of, _)| of == field) else {
                     continue;
                 };
-                if !self.alike(*field, bytes, found) {
-                    let at = bytes.iter().zip(*found).position(|(a, b)| a != b);
+                if !self.alike(*field, bytes, other_bytes) {
+                    let at = bytes.iter().zip(*other_bytes).position(|(a, b)| a != b);
                     return Err(format!(
                         "world {world}, frame {k}: {field:?} differs from byte {} on: {:?} and {:?}",
                         at.unwrap_or(0),
                         self.numbers(bytes),
-                        self.numbers(found),
+                        self.numbers(other_bytes),
                     ));
                 }
             }
         }
-        let ((counters, numbers), (others, found)) =
-            (self.record(&self.end, world), other.record(&other.end, its));
+        let ((counters, numbers), (others, other_numbers)) = (
+            self.record(&self.end, world),
+            other.record(&other.end, other_world),
+        );
         if counters != others {
             return Err(format!(
                 "world {world} at the end: counters {counters:?} and {others:?}"
             ));
         }
-        if numbers != found {
-            let (a, b) = (self.numbers(numbers), self.numbers(found));
+        if numbers != other_numbers {
+            let (a, b) = (self.numbers(numbers), self.numbers(other_numbers));
             return Err(format!("world {world} at the end: numbers {a:?} and {b:?}"));
         }
         Ok(())

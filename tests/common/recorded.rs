@@ -8,21 +8,21 @@ pub fn deviations(run: &mut Run, demo: Demo, file: &str, frames: usize) -> Vec<f
     let recorded = csv(repo(file));
     run.forward();
     let from = |run: &Run, row: &[f64]| distance(&run.get(Field::JointQ, 0), &row[1..10]);
-    let mut found = vec![from(run, &recorded[0])];
+    let mut deviations = vec![from(run, &recorded[0])];
     for frame in 0..frames {
         let (field, row) = command(demo, frame);
         run.command(field, &row);
         run.step();
-        found.push(from(run, &recorded[frame + 1]));
+        deviations.push(from(run, &recorded[frame + 1]));
     }
-    found
+    deviations
 }
 
 /// Distances of world 0 in joint positions and in the cube's position from the recorded grasp, a frame each.
 pub fn grasp_deviations(run: &mut Run) -> [Vec<f64>; 2] {
     let recorded = csv(repo("tests/data/mujoco_grasp.csv"));
     run.forward();
-    let mut found = [vec![], vec![]];
+    let mut deviations = [vec![], vec![]];
     for (targets, row) in csv(repo("tests/data/grasp_targets.csv"))
         .iter()
         .zip(&recorded[1..])
@@ -31,11 +31,11 @@ pub fn grasp_deviations(run: &mut Run) -> [Vec<f64>; 2] {
         run.command(Field::JointTargetQ, &targets);
         run.step();
         let q = run.get(Field::JointQ, 0);
-        found[0].push(distance(&q[..9], &row[1..10]));
-        found[1].push(distance(&q[9..12], &row[10..13]));
+        deviations[0].push(distance(&q[..9], &row[1..10]));
+        deviations[1].push(distance(&q[9..12], &row[10..13]));
     }
-    assert_eq!(found[0].len(), FRAMES);
-    found
+    assert_eq!(deviations[0].len(), FRAMES);
+    deviations
 }
 
 /// The largest up to a frame.

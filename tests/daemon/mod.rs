@@ -180,16 +180,16 @@ pub fn unique(name: &str) -> String {
 /// Files of a name: its lock, and what begins with its stem in shared memory.
 pub fn leftovers(name: &str) -> Vec<String> {
     let daemon = paths::DaemonPaths::new(None, name).unwrap();
-    let mut found: Vec<String> = std::fs::read_dir(paths::shared_memory())
+    let mut files: Vec<String> = std::fs::read_dir(paths::shared_memory())
         .unwrap()
         .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
         .filter(|file| file.starts_with(daemon.stem()))
         .collect();
-    found.extend(
+    files.extend(
         daemon
             .lock_path()
             .exists()
             .then(|| daemon.lock_path().display().to_string()),
     );
-    found
+    files
 }

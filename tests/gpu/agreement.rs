@@ -22,9 +22,9 @@ fn start(scene: &Description) -> Run {
 /// Distance in joint positions from the recorded run, a frame.
 fn deviations(scene: &Description, demo: Demo, file: &str, frames: usize) -> Vec<f64> {
     let mut run = start(scene);
-    let found = recorded::deviations(&mut run, demo, file, frames);
+    let deviations = recorded::deviations(&mut run, demo, file, frames);
     assert_alive(&run);
-    found
+    deviations
 }
 
 #[test]
@@ -154,15 +154,15 @@ fn compare_fields(model: &Arc<Model>, name: &str) {
             _ if FOUND.contains(field) => [2e-3, 1e-2],
             _ => [2e-5, 2e-5],
         };
-        let found = [worst[WORLDS * 9 / 10], worst[WORLDS - 1]];
+        let errors = [worst[WORLDS * 9 / 10], worst[WORLDS - 1]];
         println!(
             "{name}: {}: {:.1e}, {:.1e} of {largest:.1e}",
-            row.name, found[0], found[1]
+            row.name, errors[0], errors[1]
         );
-        for (found, tolerance) in found.iter().zip(tolerances) {
+        for (error, tolerance) in errors.iter().zip(tolerances) {
             assert!(
-                *found <= tolerance * largest,
-                "{name}: {}: {found:e} of {largest:e}",
+                *error <= tolerance * largest,
+                "{name}: {}: {error:e} of {largest:e}",
                 row.name
             );
         }

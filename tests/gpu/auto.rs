@@ -30,9 +30,9 @@ impl Folder {
             let name = path.file_name().unwrap().to_string_lossy();
             name.starts_with("auto-")
         };
-        let found: Vec<PathBuf> = paths.filter(is_rates).collect();
-        assert_eq!(found.len(), 1, "{found:?}");
-        found[0].clone()
+        let files: Vec<PathBuf> = paths.filter(is_rates).collect();
+        assert_eq!(files.len(), 1, "{files:?}");
+        files[0].clone()
     }
 }
 
@@ -146,10 +146,10 @@ fn worlds_that_were_measured_are_at_their_start_bit_for_bit() {
         };
         let fresh = Options { device, ..wanted };
         let expected = played(launched(&model, &fresh));
-        let found = played(measured);
-        assert_eq!(found.2, expected.2, "{note}");
-        assert!(found.1 == expected.1, "{note}: snapshots");
-        assert!(found.0 == expected.0, "{note}: frames");
+        let replayed = played(measured);
+        assert_eq!(replayed.2, expected.2, "{note}");
+        assert!(replayed.1 == expected.1, "{note}: snapshots");
+        assert!(replayed.0 == expected.0, "{note}: frames");
     }
 }
 

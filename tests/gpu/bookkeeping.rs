@@ -169,7 +169,7 @@ fn struck(device: Device, faults: Faults) -> Vec<Vec<[f64; 2]>> {
         ..options(device, WORLDS, &[Field::JointQ])
     };
     let mut run = Run::new(&model, options);
-    let mut found = Vec::new();
+    let mut records = Vec::new();
     for frame in 0..6 {
         let (_, row) = command(Demo::Torque, frame);
         let mut rows: Vec<f64> = (0..WORLDS).flat_map(|_| row.iter().copied()).collect();
@@ -185,17 +185,17 @@ fn struck(device: Device, faults: Faults) -> Vec<Vec<[f64; 2]>> {
         run.step();
         assert_alive(&run);
         let world = |w| [run.get(Field::Status, w)[0], run.get(Field::Step, w)[0]];
-        found.push((0..WORLDS).map(world).collect());
+        records.push((0..WORLDS).map(world).collect());
         for w in 0..WORLDS {
             assert!(run.get(Field::JointQ, w).iter().all(|x| x.is_finite()));
         }
     }
     let frozen = run.sim.take_frozen();
-    found.push(vec![
+    records.push(vec![
         [frozen.not_finite as f64, frozen.out_of_bounds as f64];
         1
     ]);
-    found
+    records
 }
 
 #[test]
@@ -226,17 +226,17 @@ fn contacts_that_do_not_fit_are_counted_as_on_the_cpu() {
     let model = scene.compile().unwrap();
     let frames = [gpu(), Device::Cpu].map(|device| {
         let mut run = run(&model, device, 8, &[Field::ContactCount, Field::JointQ]);
-        let mut found = Vec::new();
+        let mut counts = Vec::new();
         for _ in 0..30 {
             run.step();
-            found.push((
+            counts.push((
                 run.get(Field::Status, 7),
                 run.get(Field::ContactsLeftOut, 7),
                 run.get(Field::ContactCount, 7),
             ));
         }
         assert_alive(&run);
-        found
+        counts
     });
     assert!(
         frames[0]

@@ -62,9 +62,9 @@ fn worlds_that_do_not_fit_are_refused_before_memory_is_taken() {
 #[test]
 fn a_frame_that_no_program_sees_as_a_whole_is_refused() {
     let model = lesson(Demo::Target).compile().unwrap();
-    let one = Simulation::layout_of(&model, &options(gpu(), 64, Field::ALL)).bytes / 64;
+    let world_bytes = Simulation::layout_of(&model, &options(gpu(), 64, Field::ALL)).bytes / 64;
     let most = adapters()[0].binding_max as usize;
-    let wanted = options(gpu(), most / one + 64, Field::ALL);
+    let wanted = options(gpu(), most / world_bytes + 64, Field::ALL);
     match Simulation::new(model, &wanted).err() {
         Some(BackendError::DeviceMemory { reason }) => {
             assert!(reason.contains("fewer worlds or fields"), "{reason}");
@@ -146,9 +146,9 @@ fn auto_falls_back_to_the_processor_where_the_gpu_does_not_start_and_says_why() 
         compile_limit: Duration::from_micros(1),
         ..auto(true, &few)
     };
-    let one = Simulation::layout_of(&model, &options(gpu(), 64, Field::ALL)).bytes / 64;
+    let world_bytes = Simulation::layout_of(&model, &options(gpu(), 64, Field::ALL)).bytes / 64;
     let too_large = Options {
-        worlds: adapters()[0].binding_max as usize / one + 64,
+        worlds: adapters()[0].binding_max as usize / world_bytes + 64,
         ..auto(true, Field::ALL)
     };
     let cases = [

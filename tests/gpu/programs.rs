@@ -50,11 +50,11 @@ fn a_world_alone_is_the_world_among_others() {
         let ops: Vec<Op> = all.into_iter().chain(ops).collect();
         let together = play(&model, &options, &ops).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         let alone: Vec<Op> = ops.iter().map(|op| op.for_worlds(&[3])).collect();
-        let one = Options {
+        let single = Options {
             worlds: 1,
             ..options.clone()
         };
-        let alone = play(&model, &one, &alone).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        let alone = play(&model, &single, &alone).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         together
             .differs(3, &alone, 0)
             .unwrap_or_else(|e| panic!("seed {seed}: {e}"));

@@ -47,8 +47,8 @@ fn check(model: &Arc<Model>, demo: Demo, frames: usize) {
         "a second run differs"
     );
     let few: Vec<usize> = vec![4095, 17, 0, 2048, 63, 64, 1];
-    for (seed, found) in few.iter().zip(bits(model, demo, &few, frames)) {
-        assert_eq!(found, all[*seed], "world {seed} of 4096 among seven");
+    for (seed, world_bits) in few.iter().zip(bits(model, demo, &few, frames)) {
+        assert_eq!(world_bits, all[*seed], "world {seed} of 4096 among seven");
     }
     assert_eq!(bits(model, demo, &[1234], frames)[0], all[1234], "alone");
     assert_ne!(all[0], all[1]);
@@ -71,8 +71,8 @@ fn worlds_that_do_not_fit_into_one_binding_are_no_different() {
     let few = [39_999, 0, 20_000, 19_999];
     let many: Vec<usize> = (0..40_000).collect();
     let all = bits(&model, Demo::Target, &many, 2);
-    for (seed, found) in few.iter().zip(bits(&model, Demo::Target, &few, 2)) {
-        assert_eq!(found, all[*seed], "world {seed} of 40000 among four");
+    for (seed, world_bits) in few.iter().zip(bits(&model, Demo::Target, &few, 2)) {
+        assert_eq!(world_bits, all[*seed], "world {seed} of 40000 among four");
     }
 }
 

@@ -119,9 +119,9 @@ fn a_card_with_its_own_memory_shows_contacts() {
 fn bounds_that_change_between_frames_hold_from_the_next_one_on() {
     let model = lesson(Demo::Torque).compile().unwrap();
     let bounds = [50.0, 1e-3, 1e-3, 50.0];
-    let found = [gpu(), Device::Cpu].map(|device| {
+    let statuses = [gpu(), Device::Cpu].map(|device| {
         let mut run = Run::new(&model, options(device, 5, &[Field::JointQd]));
-        let mut found = Vec::new();
+        let mut statuses = Vec::new();
         for joint_qd_max in bounds {
             run.sim.set_faults(Faults {
                 joint_qd_max,
@@ -131,11 +131,11 @@ fn bounds_that_change_between_frames_hold_from_the_next_one_on() {
             let push = Values::F32(&[20.0; 45]);
             run.sim.command(Field::JointF, 0..9, push).unwrap();
             run.step();
-            found.push(run.get(Field::Status, 4)[0]);
+            statuses.push(run.get(Field::Status, 4)[0]);
         }
-        found
+        statuses
     });
     let outside = f64::from(status::OUT_OF_BOUNDS);
-    assert_eq!(found[0], [0.0, outside, outside, 0.0]);
-    assert_eq!(found[0], found[1]);
+    assert_eq!(statuses[0], [0.0, outside, outside, 0.0]);
+    assert_eq!(statuses[0], statuses[1]);
 }

@@ -132,18 +132,18 @@ fn numbers_are_drawn_as_the_scene_says() {
     let model = drawn().compile().unwrap();
     let run = launched(&model, WORLDS, Precision::F64);
     let (dofs, bodies, shapes) = (model.dof_names(), model.body_names(), model.shape_names());
-    let [one, two] = ["arm/fr3_joint1", "arm/fr3_joint2"].map(|name| place(dofs, name));
+    let [first, second] = ["arm/fr3_joint1", "arm/fr3_joint2"].map(|name| place(dofs, name));
     let [link, wrist] = ["arm/fr3_link3", "arm/fr3_link6"].map(|name| place(bodies, name));
     let [cube, table] = ["cube/0", "table"].map(|name| place(shapes, name));
     for (param, index, distribution) in [
         (Param::Gravity, 2, normal(-9.81, 0.1)),
         (Param::BodyMassScale, wrist, uniform(0.9, 1.1)),
         (Param::BodyMassScale, link, normal(1.0, 0.2)),
-        (Param::JointArmature, two, uniform(0.05, 0.2)),
-        (Param::JointDamping, one, uniform(0.0, 2.0)),
-        (Param::JointTargetKe, two, uniform(1000.0, 4000.0)),
-        (Param::JointTargetKd, one, normal(200.0, 10.0)),
-        (Param::JointEffortLimit, one, uniform(40.0, 90.0)),
+        (Param::JointArmature, second, uniform(0.05, 0.2)),
+        (Param::JointDamping, first, uniform(0.0, 2.0)),
+        (Param::JointTargetKe, second, uniform(1000.0, 4000.0)),
+        (Param::JointTargetKd, first, normal(200.0, 10.0)),
+        (Param::JointEffortLimit, first, uniform(40.0, 90.0)),
         (Param::ShapeMu, cube, uniform(0.1, 1.0)),
         (Param::ShapeMu, table, normal(0.5, 0.1)),
     ] {
@@ -175,7 +175,7 @@ fn numbers_are_drawn_as_the_scene_says() {
     let damping = arm.joints.iter().find(|joint| joint.name == "fr3_joint2");
     let damping = damping.unwrap().dofs[0].damping;
     assert!(
-        column(&run, Param::JointDamping, two)
+        column(&run, Param::JointDamping, second)
             .iter()
             .all(|&x| x == damping)
     );

@@ -290,12 +290,15 @@ fn a_second_controller_learns_who_is_first_and_may_follow() {
     assert_eq!(second.controller(&mut keep_waiting()).unwrap(), None);
     reset(&first);
     let error = step(&second, &[]).unwrap_err();
-    let ours = std::process::id();
+    let own_pid = std::process::id();
     assert!(
-        matches!(error, ProtocolError::LeaseHeld { pid, .. } if pid == ours),
+        matches!(error, ProtocolError::LeaseHeld { pid, .. } if pid == own_pid),
         "{error}"
     );
-    assert_eq!(second.controller(&mut keep_waiting()).unwrap(), Some(ours));
+    assert_eq!(
+        second.controller(&mut keep_waiting()).unwrap(),
+        Some(own_pid)
+    );
     step(&first, &[]).unwrap();
     first.release(&mut keep_waiting()).unwrap();
     assert_eq!(

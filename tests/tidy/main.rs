@@ -16,19 +16,19 @@ fn root() -> PathBuf {
 
 /// Files below a folder, as paths from the root of the repository.
 fn files(folder: &str, ending: &str) -> Vec<String> {
-    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+    fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder:?}: {e}")) {
             let path = entry.unwrap().path();
             if path.is_dir() {
-                walk(&path, found);
+                walk(&path, files);
             } else {
-                found.push(path);
+                files.push(path);
             }
         }
     }
-    let mut found = Vec::new();
-    walk(&root().join(folder), &mut found);
-    let mut found: Vec<String> = found
+    let mut paths = Vec::new();
+    walk(&root().join(folder), &mut paths);
+    let mut files: Vec<String> = paths
         .iter()
         .map(|path| {
             path.strip_prefix(root())
@@ -39,9 +39,9 @@ fn files(folder: &str, ending: &str) -> Vec<String> {
         })
         .filter(|path| path.ends_with(ending))
         .collect();
-    found.sort();
-    assert!(!found.is_empty(), "no {ending} below {folder}");
-    found
+    files.sort();
+    assert!(!files.is_empty(), "no {ending} below {folder}");
+    files
 }
 
 fn read(path: &str) -> String {
@@ -104,7 +104,7 @@ fn modules_import_only_those_before_them() {
         for path in files(folder, ".rs") {
             let module = path.trim_start_matches(folder).trim_start_matches('/');
             let module = module.trim_end_matches(".rs").split('/').next().unwrap();
-            let Some(own) = order.iter().position(|&m| m == module) else {
+            let Some(place) = order.iter().position(|&m| m == module) else {
                 continue;
             };
             // `super` once for each folder between a file and the crate's root leads there too
@@ -116,7 +116,7 @@ fn modules_import_only_those_before_them() {
                     let roots = [root.as_str(), up.as_str()].map(|root| format!("{root}{later}"));
                     roots.iter().any(|later| has_path(&line, later))
                 };
-                if order[own + 1..].iter().any(|later| imports(later)) {
+                if order[place + 1..].iter().any(|later| imports(later)) {
                     wrong.push(format!("{path}: {line}"));
                 }
             }
@@ -255,13 +255,13 @@ fn kept_programs_name_the_naga_that_wrote_them() {
 
 #[test]
 fn unsafe_stands_where_it_may() {
-    let found: BTreeSet<String> = sources()
+    let with_unsafe: BTreeSet<String> = sources()
         .into_iter()
         .filter(|path| !path.ends_with("tests.rs"))
         .filter(|path| code(path).iter().any(|line| line.contains("unsafe ")))
         .collect();
     let listed: BTreeSet<String> = UNSAFE.iter().map(|&path| path.to_owned()).collect();
-    assert_eq!(found, listed);
+    assert_eq!(with_unsafe, listed);
 }
 
 /// Code for several threads per world: it is recorded, but no CPU runs it, so it may take memory.
@@ -361,11 +361,11 @@ fn paths_named_in_the_documents_exist() {
                     .iter()
                     .any(|e| word.ends_with(e));
             // other projects' files are named too: ours begin with a folder of the root; what is in out/ is made by use
-            let ours = word
+            let is_in_tree = word
                 .split('/')
                 .next()
                 .is_some_and(|first| first != "out" && root().join(first).exists());
-            if looks && ours && !root().join(word).exists() {
+            if looks && is_in_tree && !root().join(word).exists() {
                 wrong.push(format!("{document}: {word}"));
             }
         }

@@ -146,10 +146,10 @@ pub fn errors(
     machine: &[Left],
     passed_over: &[bool],
 ) -> Vec<Errors> {
-    let of = |left: &[Left]| -> Vec<Vec<Part>> {
+    let parts_of = |left: &[Left]| -> Vec<Vec<Part>> {
         left.iter().map(|left| parts(m, stage, left)).collect()
     };
-    let (expected, got) = (of(reference), of(machine));
+    let (expected, got) = (parts_of(reference), parts_of(machine));
     let same_list: Vec<bool> = (reference.iter().zip(machine))
         .map(|(a, b)| list(m, a) == list(m, b))
         .collect();

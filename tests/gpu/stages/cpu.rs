@@ -135,15 +135,15 @@ pub fn scalar(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Left> 
 
 /// Single precision, in every register that this processor has.
 pub fn registers(m: &Constants<f32>, stage: StageId, given: &[Given]) -> Vec<Vec<Left>> {
-    let mut found = Vec::new();
+    let mut results = Vec::new();
     if available(Lanes::Eight) {
         // SAFETY: as just asked.
-        found.push(unsafe { eight(stages_f32x8::STAGES[stage.index()], m, stage, given) });
+        results.push(unsafe { eight(stages_f32x8::STAGES[stage.index()], m, stage, given) });
     }
     #[cfg(target_arch = "x86_64")]
     if available(Lanes::Sixteen) {
         // SAFETY: as just asked.
-        found.push(unsafe { sixteen(stages_f32x16::STAGES[stage.index()], m, stage, given) });
+        results.push(unsafe { sixteen(stages_f32x16::STAGES[stage.index()], m, stage, given) });
     }
-    found
+    results
 }

@@ -31,32 +31,32 @@ const MORE: f64 = 0.125;
 
 /// The tolerance of a stage.
 fn tolerance(stage: StageId, part: &str) -> Tolerance {
-    let of = |near, beyond| Tolerance { near, beyond };
+    let within = |near, beyond| Tolerance { near, beyond };
     if let Some(kinds) = pair(stage) {
         return match kinds {
             // corners cut from faces: the cut divides by how fast an edge leaves the face
-            (Kind::Box, Kind::Box) => of(1e-5, 0),
-            (Kind::Plane, _) => of(1e-6, 0),
+            (Kind::Box, Kind::Box) => within(1e-5, 0),
+            (Kind::Plane, _) => within(1e-6, 0),
             // walls and rims of cylinders: a search, which ends where `f32` sees no progress; a wall that lies on a face or along
             // another wall may touch it anywhere
-            (Kind::Sphere, _) => of(1e-6, 0),
-            (Kind::Box, Kind::Cylinder) => of(1e-3, 10),
-            (Kind::Cylinder, Kind::Cylinder) => of(5e-3, 1),
-            (_, Kind::Cylinder) | (Kind::Cylinder, _) => of(5e-3, 0),
-            _ => of(1e-6, 0),
+            (Kind::Sphere, _) => within(1e-6, 0),
+            (Kind::Box, Kind::Cylinder) => within(1e-3, 10),
+            (Kind::Cylinder, Kind::Cylinder) => within(5e-3, 1),
+            (_, Kind::Cylinder) | (Kind::Cylinder, _) => within(5e-3, 0),
+            _ => within(1e-6, 0),
         };
     }
     match stage.name() {
         // forces of contacts are stiffness times what is left of accelerations that cancel
-        "solver" | "solver_turning" => of(2e-3, 4),
-        "refine" | "accelerations" => of(1e-5, 0),
+        "solver" | "solver_turning" => within(2e-3, 4),
+        "refine" | "accelerations" => within(1e-5, 0),
         // a matrix that is nearly singular where the arm is stretched
-        "site_inverse" => of(1e-4, 0),
+        "site_inverse" => within(1e-4, 0),
         // a rounding of a position is what its rest keeps
-        "integrate" if part == POSITIONS => of(3e-8, 0),
-        "integrate" => of(1e-5, 0),
+        "integrate" if part == POSITIONS => within(3e-8, 0),
+        "integrate" => within(1e-5, 0),
         // some roundings of the largest number
-        _ => of(1e-6, 0),
+        _ => within(1e-6, 0),
     }
 }
 
