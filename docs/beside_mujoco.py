@@ -26,7 +26,7 @@ from tightloop.view.poses import IDENTITY, compose
 os.environ.setdefault("MUJOCO_GL", "egl")
 import mujoco
 
-FILE = Path(__file__).resolve().parent / "pages/beside_mujoco.webp"
+FILE = Path(__file__).resolve().parent / "pages/assets/beside_mujoco.webp"
 WIDTH, HEIGHT = 720, 540
 CAMERA = Camera((1.25, -1.75, 0.95), (-0.25, -0.42, 0.33), 0.6)
 JOINTS = [0.0, -0.6, 0.0, -2.2, 0.0, 1.7, 0.8, 0.03, 0.03]

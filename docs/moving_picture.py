@@ -19,7 +19,7 @@ from tightloop.demo import lesson
 from tightloop.view import Camera, Picture
 from tightloop.view.parts import parts
 
-FILE = Path(__file__).resolve().parents[1] / "examples/moving_picture.webp"
+FILE = Path(__file__).resolve().parent / "pages/assets/moving_picture.webp"
 SIZE = 720, 405  # pixels
 WORLDS, SIDE = 4096, 64
 # Every sixth frame of 60 a second; a wave takes 120 of them, so that its part repeats without a jump.

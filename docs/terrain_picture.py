@@ -18,7 +18,7 @@ from tightloop.tasks.quadruped import ROBOT
 from tightloop.view import Picture
 from tightloop.view.parts import parts
 
-FILE = Path(__file__).resolve().parent / "pages/terrain.webp"
+FILE = Path(__file__).resolve().parent / "pages/assets/terrain.webp"
 SIZE = 960, 600  # pixels
 KINDS = ("stairs", "rough", "steps")
 HARDEST = {"stairs": 0.15, "rough": 0.08, "steps": 0.15}  # [m]

@@ -23,7 +23,7 @@ from tightloop.view import Camera, Picture
 from tightloop.view.parts import parts
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-FILE = REPOSITORY / "docs/pages/walking.webp"
+FILE = REPOSITORY / "docs/pages/assets/walking.webp"
 POLICY = REPOSITORY / "examples/trained/QuadrupedVelocityFlat.onnx"
 SIZE = 640, 360  # pixels
 WORLDS, STEPS, EVERY = 16, 250, 4  # control steps of 20 ms, and of how many one is shown

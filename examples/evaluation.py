@@ -137,7 +137,7 @@ def told_with_intervals(found: Mapping[str, NDArray[Any]]) -> str:
 
 def main() -> None:
     """Evaluate each, and all together."""
-    from training import needed
+    from learning.program import needed
 
     with needed("onnxruntime"):
         import onnxruntime

@@ -3,7 +3,7 @@
     python examples/newton_lesson.py --worlds 4096        # --view shows it in the browser
 
 The lesson: https://docs.nvidia.com/learning/physical-ai/getting-started-with-newton/latest/newton-fundamentals/robot-control.html
-docs/pages/lesson.md has its calls and ours side by side.
+docs/pages/start/lesson.md has its calls and ours side by side.
 """
 
 from __future__ import annotations

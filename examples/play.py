@@ -18,10 +18,10 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
-from filming import Shooting, film_of
+from learning.filming import Shooting, film_of
+from learning.program import needed
 from numpy.typing import NDArray
 from places import OUT
-from training import needed
 
 from evaluation import metrics
 from tightloop.env import AutoresetMode, VectorEnv

@@ -5,7 +5,7 @@
     python examples/policy_file.py out/rsl_rl/FrankaReach-0/policy.onnx --task FrankaReach
 
 The metadata says what a program needs to run the policy elsewhere: names and order of the observation, the action and
-the joints, scales, rates and gains. ``docs/pages/walking.md`` lists its entries.
+the joints, scales, rates and gains. ``docs/pages/use/walking.md`` lists its entries.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from training import needed
+from learning.program import needed
 
 from tightloop.env import VectorEnv, policy_metadata
 from tightloop.whole_files import whole_file

@@ -36,12 +36,12 @@ from typing import Any
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
+from learning.films import Films
+from learning.log import Log, Statistics
+from learning.program import draw, needed, report
+from learning.watch import TermWatch, nothing_learnt
 from numpy.typing import NDArray
 from places import OUT, PLAY
-from training import draw, needed, report
-from training_films import Films
-from training_log import Log, Statistics
-from training_watch import TermWatch, nothing_learnt
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
 from tightloop.env import AutoresetMode, VectorEnv, policy_metadata
@@ -52,7 +52,7 @@ from tightloop.whole_files import whole_file
 # onnx and onnxscript are needed only at the end, for the policy's file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
-    from agent import Agent
+    from learning.agent import Agent
     from policy_file import export
     from torch import Tensor, nn
     from tqdm import tqdm

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from learning.program import needed
 from numpy.typing import NDArray
-from training import needed
 
 import tightloop as tl
 from tightloop.env import Worlds

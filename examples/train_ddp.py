@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from learning.program import needed, report
 from numpy.typing import NDArray
 from places import OUT
-from training import needed, report
 
 from evaluation import evaluate, told
 from tightloop.adapters.torchrun import Rank
@@ -29,7 +29,7 @@ from tightloop.env import AutoresetMode, policy_metadata
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     import torch.distributed as dist
-    from agent import Agent, Normalizer
+    from learning.agent import Agent, Normalizer
     from policy_file import export
     from ppo import PRESETS, Config, Rollout
     from torch import Tensor, nn

@@ -180,7 +180,7 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
     ),
     "ray_cluster": Bench(
         "Environments on a Ray cluster",
-        """A step of an environment, and the data that crosses for it. [Many machines](clusters.md) describes it.
+        """A step of an environment, and the data that crosses for it. [Many machines](../use/clusters.md) describes it.
 
 - The three nodes of the cluster are on one machine, so no network is measured. Daemons have one thread each.
 - Other programs used the machine as well.

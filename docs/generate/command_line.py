@@ -20,7 +20,7 @@ def help_of(*command: str) -> str:
 
 
 def parts() -> dict[str, str]:
-    """Parts of the page `command-line.md`."""
+    """Parts of the page `reference/command-line.md`."""
     texts = ["```text\n" + help_of() + "```\n"]
     texts += [f"## tightloop {name}\n\n```text\n{help_of(name).rstrip()}\n```\n" for name in commands()]
     return {"commands": "\n".join(texts)}

@@ -28,7 +28,7 @@ def _shape(row: CommandRow) -> str:
 
 
 def parts() -> dict[str, str]:
-    """Parts of the page `fields.md`."""
+    """Parts of the page `reference/fields.md`."""
     info = description()
     always = {"time", "step", "status", "contacts_left_out"}
 

@@ -20,11 +20,11 @@ from generate.rust import REPOSITORY
 DOCS = REPOSITORY / "docs/pages"
 #: The parts of each page, by their names.
 PARTS: dict[str, Callable[[], dict[str, str]]] = {
-    "command-line.md": command_line.parts,
-    "fields.md": fields.parts,
-    "protocol.md": protocol.parts,
-    "scene-file.md": scene_file.parts,
-    "tasks.md": tasks.parts,
+    "reference/command-line.md": command_line.parts,
+    "reference/fields.md": fields.parts,
+    "reference/protocol.md": protocol.parts,
+    "reference/scene-file.md": scene_file.parts,
+    "reference/tasks.md": tasks.parts,
 }
 
 _FORGE = re.compile(r"<!-- forge -->.*?<!-- end -->\n*", re.DOTALL)

@@ -1,6 +1,6 @@
 """The performance page and the README's table of speed, from the committed results of the benches.
 
-    cd docs && python -m generate.performance     # rewrites docs/pages/performance.md and the table of README.md
+    cd docs && python -m generate.performance     # rewrites the page and the table of README.md
 
 Both files are committed, so that a forge shows them. ``tests/python/docs/test_prose.py`` holds them to the results.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 
 from generate.benches import BENCHES, Bench
@@ -18,7 +19,7 @@ from generate.summary import INTRODUCTION, SUMMARY
 from generate.tables import table
 
 RESULTS = REPOSITORY / "benches/results"
-PAGE = REPOSITORY / "docs/pages/performance.md"
+PAGE = REPOSITORY / "docs/pages/reference/performance.md"
 README = REPOSITORY / "README.md"
 _MARKED = re.compile(r"(?<=<!-- speed: docs/generate/performance\.py -->\n\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
@@ -50,15 +51,14 @@ def read(path: Path) -> Result:
     return made
 
 
-def page() -> str:
-    """The page."""
-    parts, last = [INTRODUCTION, summary()], ""
-    for path in measured():
-        bench = BENCHES.get(path.stem, Bench(path.stem.replace("_", " ").capitalize(), ""))
-        if path.stem != last:
-            parts.append(f"## {bench.title}\n\n{bench.text}")
-            last = path.stem
-        parts.append(section(read(path), bench))
+def page(*, every: bool = False) -> str:
+    """The page: the newest table of each topic, or with ``every`` those of all machines, as the site has them."""
+    parts = [INTRODUCTION, summary()]
+    for stem, paths in groupby(measured(), key=lambda path: path.stem):
+        bench = BENCHES.get(stem, Bench(stem.replace("_", " ").capitalize(), ""))
+        results = [read(path) for path in paths]
+        parts.append(f"## {bench.title}\n\n{bench.text}")
+        parts += [section(result, bench) for result in results] if every else [newest(results, bench)]
     return "\n".join(parts)
 
 
@@ -67,21 +67,41 @@ def measured() -> list[Path]:
     return sorted(RESULTS.glob("*/*.csv"), key=_order)
 
 
+def newest(results: list[Result], bench: Bench) -> str:
+    """The newest of a topic's results: its rows, then its file and those of other machines."""
+    last = max(results, key=lambda result: result.facts.get("date", ""))
+    others = ", ".join(f"{_link(result)} ({_machine(result)})" for result in results if result is not last)
+    source = f"Measured on {_machine(last)}: {_link(last)}."
+    return f"{_rows(last, bench)}\n{source}{f' Other machines: {others}.' if others else ''}\n"
+
+
 def section(result: Result, bench: Bench) -> str:
     """A file: its rows, then where they come from."""
-    columns = bench.columns or {name: name.replace("_", " ") for name in result.rows[0]}
-    rows = [[_readable(bench.words.get(row[name], row[name])) for name in columns] for row in result.rows]
     facts = dict(result.facts)
     machine = facts.pop("cpu", result.path.parent.name)
-    source = f"[`{result.path.name}`](../../{result.path.relative_to(REPOSITORY)})"
-    known = {"machine": machine, "results": source, "commit": facts.pop("commit", "unknown")}
+    known = {"machine": machine, "results": _link(result), "commit": facts.pop("commit", "unknown")}
     known["command"] = f"`{_command_today(facts.pop('command', 'unknown'))}`"
     return (
-        f"### {bench.title.partition(',')[0]}: {facts.get('adapter', machine)}\n\n"
-        + table(list(columns.values()), rows)
+        f"### {bench.title.partition(',')[0]}: {_machine(result)}\n\n"
+        + _rows(result, bench)
         + "\n"
         + table(["source", ""], [[name, value] for name, value in (known | facts).items()])
     )
+
+
+def _rows(result: Result, bench: Bench) -> str:
+    columns = bench.columns or {name: name.replace("_", " ") for name in result.rows[0]}
+    rows = [[_readable(bench.words.get(row[name], row[name])) for name in columns] for row in result.rows]
+    return table(list(columns.values()), rows)
+
+
+def _machine(result: Result) -> str:
+    """The GPU, or the processor with its cores."""
+    return result.facts.get("adapter", result.facts.get("cpu", result.path.parent.name))
+
+
+def _link(result: Result) -> str:
+    return f"[`{result.path.name}`](../../../{result.path.relative_to(REPOSITORY)})"
 
 
 def _command_today(recorded: str) -> str:

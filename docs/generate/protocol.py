@@ -60,7 +60,7 @@ def _codes(source: str, enum: str) -> list[str]:
 
 
 def parts() -> dict[str, str]:
-    """Parts of the page `protocol.md`."""
+    """Parts of the page `reference/protocol.md`."""
     version = re.search(r"PROTOCOL_VERSION: u32 = (\d+)", rust.source(HEADERS))
     assert version is not None
     structs = []

@@ -182,7 +182,7 @@ def words(source: str, enum: str) -> list[rust.Item]:
 
 
 def parts() -> dict[str, str]:
-    """Parts of the page `scene-file.md`."""
+    """Parts of the page `reference/scene-file.md`."""
     texts = list[str]()
     for shown in TABLES:
         struct = rust.listing(f"{CONFIG}/{shown.source}", shown.struct)

@@ -9,7 +9,7 @@ from tightloop.env.registry import GYMNASIUM_TASKS, TASKS, make_task
 
 
 def parts() -> dict[str, str]:
-    """Parts of the page `tasks.md`."""
+    """Parts of the page `reference/tasks.md`."""
     rows, modules = [], dict[str, list[str]]()
     for name in TASKS | GYMNASIUM_TASKS:
         task = make_task(name, {})

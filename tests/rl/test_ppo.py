@@ -220,7 +220,7 @@ def test_a_run_that_ends_by_steps_goes_on_with_the_same_bits(tmp_path: Path) -> 
     code = f"""
 import ppo, torch
 from pathlib import Path
-from training_log import Log
+from learning.log import Log
 
 class Stopped(Exception):
     pass

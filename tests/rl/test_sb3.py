@@ -21,7 +21,7 @@ import tightloop as tl
 from tightloop.adapters.sb3 import Sb3VecEnv
 from tightloop.env import Env
 
-PAGE = Path(__file__).parents[2] / "docs/pages/rl-libraries.md"
+PAGE = Path(__file__).parents[2] / "docs/pages/use/rl-libraries.md"
 
 
 @pytest.mark.parametrize("task", ["CartPoleBalance", "CartPoleSwingUp", "FrankaReach"])

@@ -25,7 +25,11 @@ from generate import command_line, pages, performance, scene_file
 
 PAGES = REPOSITORY / "docs/pages"
 # a page with generated parts is run with them
-WRITTEN = sorted(path for path in PAGES.rglob("*.md") if "```" in path.read_text() and path.name not in pages.PARTS)
+WRITTEN = sorted(
+    path
+    for path in PAGES.rglob("*.md")
+    if "```" in path.read_text() and str(path.relative_to(PAGES)) not in pages.PARTS
+)
 
 
 @pytest.mark.parametrize("path", WRITTEN, ids=lambda path: str(path.relative_to(PAGES)))
@@ -54,7 +58,7 @@ def test_the_generated_parts_of_a_page_are_those_of_the_code(name):
 
 def test_a_page_without_the_place_of_a_part_is_refused():
     with pytest.raises(LookupError, match=r"fields\.md has places for .*; give it those for .*parameters"):
-        pages.write("fields.md", "# Fields\n<!-- generated: fields -->\n<!-- end -->\n")
+        pages.write("reference/fields.md", "# Fields\n<!-- generated: fields -->\n<!-- end -->\n")
 
 
 def test_blocks_that_do_not_run_say_why():
@@ -135,7 +139,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(command, cwd=REPOSITORY, env=quiet, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for name in [*pages.PARTS, "performance.md"]:
+    for name in [*pages.PARTS, "reference/performance.md"]:
         assert (tmp_path / name.replace(".md", ".html")).stat().st_size > 10_000
     text = (tmp_path / "api/simulation.html").read_text()
     assert "Advance every world by one control frame" in text and "contact_normal" in text
@@ -180,7 +184,7 @@ def test_the_reference_has_the_words_that_the_parser_knows(word, text, tmp_path)
 
 
 def test_the_command_line_page_has_every_command():
-    text = pages.page("command-line.md")
+    text = pages.page("reference/command-line.md")
     named = command_line.commands()
     some = {"serve", "inspect", "bench", "record", "replay", "devices", "list", "top", "stop", "completions", "man"}
     assert some <= set(named)
@@ -212,19 +216,22 @@ def test_the_readme_says_what_robots_on_the_ground_gain():
     assert [int(number) for number in said.groups()] == [round(min(ratios)), round(max(ratios))]
 
 
-def test_the_performance_page_has_every_result():
-    text = (PAGES / "performance.md").read_text()
+def test_the_performance_page_names_every_result_and_the_site_has_its_rows():
+    short, full = performance.page(), performance.page(every=True)
     for path in performance.measured():
-        assert f"({os.path.relpath(path, PAGES)})" in text
-        rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
-        assert text.count("\n| ") >= len(rows)
+        link = f"({os.path.relpath(path, performance.PAGE.parent)})"
+        assert link in short and link in full
+    rows = sum(len(performance.read(path).rows) for path in performance.measured())
+    assert full.count("\n| ") >= rows
+    topics = {path.stem for path in performance.measured()}
+    assert short.count("\n## ") == full.count("\n## ") == len(topics) + 1
 
 
 def test_the_field_page_has_every_field_that_frames_name():
     stubs = (REPOSITORY / "py-client/python/tightloop/_core.pyi").read_text()
     frame = stubs.partition("class Frame:")[2].partition("\nclass ")[0]
     named = set(re.findall(r"^    (\w+): NDArray", frame, re.MULTILINE))
-    text = pages.page("fields.md")
+    text = pages.page("reference/fields.md")
     # what only observers get, and no launch asks for
     named.remove("state")
     assert "`state`" in text

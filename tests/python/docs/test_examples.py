@@ -60,15 +60,7 @@ importlib.util.find_spec = lambda name, package=None: None if name in missing el
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 # Modules of the others.
-PARTS = {
-    "agent.py",
-    "filming.py",
-    "places.py",
-    "training.py",
-    "training_films.py",
-    "training_log.py",
-    "training_watch.py",
-}
+PARTS = {"places.py"}
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -101,9 +93,12 @@ def test_every_example_has_a_test():
     assert there == {*RUNS, *TRAINING, *PARTS}
     for name, test in TRAINING.items():
         assert name.removesuffix(".py") in (REPOSITORY / test).read_text(), f"{test} does not run {name}"
-    for name in PARTS:
-        users = [path for path in EXAMPLES.glob("*.py") if f"from {Path(name).stem} import" in path.read_text()]
-        assert users, f"nobody imports {name}"
+    texts = {path: path.read_text() for path in [*EXAMPLES.glob("*.py"), *EXAMPLES.glob("learning/*.py")]}
+    modules = [Path(name).stem for name in PARTS] + [
+        f"learning.{path.stem}" for path in EXAMPLES.glob("learning/[a-z]*.py")
+    ]
+    for module in modules:
+        assert any(f"from {module} import" in text for text in texts.values()), f"nobody imports {module}"
     assert [path.name for path in EXAMPLES.glob("*.rs")] == ["franka_lesson.rs"]
 
 

@@ -12,7 +12,7 @@ from code_blocks import blocks
 from conftest import REPOSITORY
 
 EXAMPLE = REPOSITORY / "examples/newton_lesson.py"
-PAGE = REPOSITORY / "docs/pages/lesson.md"
+PAGE = REPOSITORY / "docs/pages/start/lesson.md"
 THEIRS = 206  # lines of the lesson's last listing
 
 

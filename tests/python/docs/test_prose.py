@@ -79,7 +79,7 @@ def test_links_lead_to_files_of_the_repository(document):
 def test_a_link_that_leads_nowhere_is_found():
     text = "[a](no-such.md) `[b](code.md)` [c](https://example.org)\n\n```text\n[d](fenced.md)\n```\n\n[e]: ref.md\n"
     assert links(text) == ["no-such.md", "ref.md"]
-    assert "what-make-does" in anchors(REPOSITORY / "docs/pages/install.md")
+    assert "what-make-does" in anchors(REPOSITORY / "docs/pages/start/install.md")
 
 
 def test_files_that_documents_link_to_are_committed():

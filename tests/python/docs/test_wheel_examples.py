@@ -63,8 +63,8 @@ def test_nothing_is_overwritten_and_wrong_names_are_reported(tmp_path):
     assert [path.name for path in own.parent.iterdir()] == ["own_task.py"]
     done = call("tightloop.examples", "run", "own_tsk", cwd=tmp_path)
     assert done.returncode == 2 and "no example 'own_tsk'; there are" in done.stderr and "own_task" in done.stderr
-    with pytest.raises(ArgumentError, match="filming"):
-        examples.program("filming")
+    with pytest.raises(ArgumentError, match="places"):
+        examples.program("places")
 
 
 def test_all_are_copied_into_a_folder(tmp_path):

@@ -16,7 +16,7 @@ from tightloop.tasks.quadruped import ROBOT, QuadrupedVelocityFlat
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "examples"))
 
-from training_watch import TermWatch, nothing_learnt
+from learning.watch import TermWatch, nothing_learnt
 
 OWN = QuadrupedVelocityFlat.reward_weights
 

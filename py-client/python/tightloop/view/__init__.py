@@ -1,6 +1,6 @@
 """Shows worlds in a browser, as pictures or as films, from a running daemon or a recording.
 
-Its libraries come with the extra ``view``; docs/pages/install.md says how to install it.
+Its libraries come with the extra ``view``; docs/pages/start/install.md says how to install it.
 
 >>> from tightloop.view import Film
 >>> with Film("run.mp4", sim) as film:

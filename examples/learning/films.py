@@ -14,8 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from filming import film_of
-
+from learning.filming import film_of
 from tightloop import system
 from tightloop.env import VectorEnv
 
@@ -23,7 +22,7 @@ SECONDS = 10.0  # of a film, at most
 FILMED = 4  # worlds in it
 NICENESS = 10  # about a tenth of a busy core
 STOP_SECONDS = 10.0  # to wait for the end of a film that is given up
-CHILD = "import sys; sys.path.insert(0, sys.argv[1]); import training_films; training_films.film(*sys.argv[2:])"
+CHILD = "import sys; sys.path.insert(0, sys.argv[1]); from learning import films; films.film(*sys.argv[2:])"
 
 
 class Films:
@@ -68,7 +67,7 @@ class Films:
         self._film = self._folder / f"{steps}.mp4"
         snapshot = self._film.with_suffix(".pt")
         save(snapshot, json.dumps(self._about, default=str))
-        here = str(Path(__file__).parent)
+        here = str(Path(__file__).parents[1])
         command = [sys.executable, "-c", CHILD, here, str(snapshot), str(self._film), str(os.getpid())]
         self._process = system.start_apart(command)
         return problem
@@ -110,7 +109,8 @@ def film(snapshot: str, out: str, parent: str) -> None:
     for number in system.stop_signals():
         signal.signal(number, lambda *_: sys.exit(1))
     import torch
-    from agent import Agent
+
+    from learning.agent import Agent
 
     torch.set_num_threads(1)
     state = torch.load(snapshot, weights_only=True)
