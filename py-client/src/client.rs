@@ -88,16 +88,6 @@ impl Client {
         Ok(serde_json::to_string(&timing).expect("it is plain data"))
     }
 
-    /// Names of the arrays that a step, a write or a reset cannot take as they are.
-    fn unready(&self, py: Python<'_>, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
-        let names = self.table.unready(given)?;
-        if !names.is_empty() {
-            // that the client is closed, or another process's, comes before what is wrong with a value
-            self.connection(py)?;
-        }
-        Ok(names)
-    }
-
     /// What the columns of an input are of: names, the number of columns, how many each name has, and the parts of the
     /// robots, if it comes by robot. None if the scene does not have it.
     fn layout(&self, name: &str) -> Option<Layout> {
@@ -170,9 +160,9 @@ impl Client {
     fn reset(
         &self,
         py: Python<'_>,
+        given: &Bound<'_, PyDict>,
         mask: Mask<'_>,
         seeds: Seeds<'_>,
-        given: &Bound<'_, PyDict>,
     ) -> PyResult<PyFrame> {
         let connection = self.connection(py)?;
         let inputs = self.table.take(given)?;

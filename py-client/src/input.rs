@@ -1,14 +1,12 @@
-//! What a caller gives for a command: arrays that are ready to be copied once. `tightloop.sim.command_arrays` makes others
-//! ready.
+//! What a caller gives for a command: arrays that are copied once. `tightloop.sim.command_arrays` converts others.
 
 use std::ops::Range;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyDict;
 use sim_protocol::{Command, Description, RobotRange, Values};
-
-use crate::errors::raise;
 
 /// A robot's part of the columns of an input: its name, the first column, the end, and how many are of a floating base.
 pub(crate) type Place = (String, usize, usize, usize);
@@ -23,6 +21,8 @@ pub(crate) struct InputTable {
 pub(crate) struct InputRow {
     name: String,
     pub(crate) columns: usize,
+    /// The shape of an array of all columns that is taken as it is.
+    shape: Vec<usize>,
     /// Columns of each name.
     pub(crate) parts: usize,
     pub(crate) names: Vec<String>,
@@ -73,20 +73,17 @@ impl InputRow {
                 Some((robot.name.clone(), start, stop, base))
             })
             .collect();
+        let worlds = description.worlds;
         InputRow {
             name: name.to_owned(),
             columns,
+            shape: match parts {
+                1 => vec![worlds, columns],
+                parts => vec![worlds, columns / parts, parts],
+            },
             parts,
             names: names.to_vec(),
             robots: robots.filter(|_| RobotRange::has(&axis)),
-        }
-    }
-
-    /// The shape of an array of all columns that is taken as it is.
-    fn shape(&self, worlds: usize) -> Vec<usize> {
-        match self.parts {
-            1 => vec![worlds, self.columns],
-            parts => vec![worlds, self.columns / parts, parts],
         }
     }
 
@@ -111,6 +108,25 @@ fn base(axis: &str, names: &[String]) -> usize {
     let is_free =
         names.len() > size && names[0].ends_with(first) && names[size - 1].ends_with(last);
     if is_free { size } else { 0 }
+}
+
+pyo3::create_exception!(
+    _core,
+    NotReady,
+    PyException,
+    "The values of these names are converted before the client takes them; nothing was done."
+);
+
+/// Values of a command or state that Python has converted: runs of neighbouring columns, each with its first column.
+#[pyclass(frozen, module = "tightloop._core")]
+pub(crate) struct Columns(Vec<(usize, Py<PyArrayDyn<f64>>)>);
+
+#[pymethods]
+impl Columns {
+    #[new]
+    fn new(runs: Vec<(usize, Py<PyArrayDyn<f64>>)>) -> Columns {
+        Columns(runs)
+    }
 }
 
 /// The arrays of one command.
@@ -164,53 +180,66 @@ impl Input<'_, '_> {
 }
 
 impl InputTable {
-    /// Names of the arrays that cannot be taken as they are.
-    pub(crate) fn unready(&self, given: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
-        let mut names = Vec::new();
-        for (name, value) in given {
-            let name: &str = name.extract()?;
-            let is_ready = || {
-                let row = self.row(name)?;
-                let whole = Array::from_value(&value)
-                    .filter(|array| array.shape() == row.shape(self.worlds));
-                match whole {
-                    Some(_) => Some(()),
-                    None => self.by_robot(row, &value).map(drop),
-                }
-            };
-            if !value.is_none() && is_ready().is_none() {
-                names.push(name.to_owned());
-            }
-        }
-        Ok(names)
-    }
-
-    /// Takes arrays by name: of all columns, as `tightloop.sim.command_arrays` makes them ready.
+    /// Takes values by name, as arrays that are copied once.
+    ///
+    /// # Errors
+    /// `NotReady` with the names of values that Python converts first.
     pub(crate) fn take<'a, 'py>(&'a self, given: &Bound<'py, PyDict>) -> PyResult<Inputs<'a, 'py>> {
         let mut inputs = Vec::with_capacity(given.len());
+        let mut unready = Vec::new();
         for (name, value) in given {
             if value.is_none() {
                 continue;
             }
             let name: &str = name.extract()?;
-            let refused = |reason: String| raise(value.py(), "CommandRefused", reason);
-            let row = self.row(name);
-            let row = row.ok_or_else(|| refused(format!("this scene has no `{name}`")))?;
-            if let Some(array) = Array::from_value(&value) {
+            let is_taken = match self.row(name) {
+                Some(row) => self.put(row, &value, &mut inputs)?,
+                None => false,
+            };
+            if !is_taken {
+                unready.push(name.to_owned());
+            }
+        }
+        if unready.is_empty() {
+            Ok(Inputs(inputs))
+        } else {
+            Err(NotReady::new_err((unready,)))
+        }
+    }
+
+    /// Adds the arrays of a value, and returns whether it is taken as it is.
+    fn put<'a, 'py>(
+        &self,
+        row: &'a InputRow,
+        value: &Bound<'py, PyAny>,
+        inputs: &mut Vec<Input<'a, 'py>>,
+    ) -> PyResult<bool> {
+        if let Some(array) = Array::from_value(value) {
+            let fits = array.shape() == row.shape;
+            if fits {
                 inputs.push(Input {
                     field: &row.name,
                     columns: 0..row.columns,
                     array,
                 });
-            } else if let Ok(runs) = value.cast::<PyList>() {
-                inputs.extend(runs_of(row, runs)?);
-            } else if let Some(parts) = self.by_robot(row, &value) {
-                inputs.extend(parts);
-            } else {
-                return Err(refused(format!("{name}: its rows are not contiguous")));
             }
+            return Ok(fits);
         }
-        Ok(Inputs(inputs))
+        if let Ok(columns) = value.cast::<Columns>() {
+            for (first, values) in &columns.get().0 {
+                let values = values.bind(value.py()).try_readonly()?;
+                inputs.push(Input {
+                    field: &row.name,
+                    columns: *first..first + values.shape()[1],
+                    array: Array::F64(values),
+                });
+            }
+            return Ok(true);
+        }
+        let parts = self.by_robot(row, value);
+        let is_taken = parts.is_some();
+        inputs.extend(parts.into_iter().flatten());
+        Ok(is_taken)
     }
 
     /// A dict of arrays by robot, if each can be taken as it is.
@@ -235,20 +264,6 @@ impl InputTable {
         });
         parts.collect()
     }
-}
-
-/// Runs of neighbouring columns: the first column of each, and its array.
-fn runs_of<'a, 'py>(row: &'a InputRow, runs: &Bound<'py, PyList>) -> PyResult<Vec<Input<'a, 'py>>> {
-    let inputs = runs.iter().map(|run| {
-        let (first, array): (usize, Bound<'py, PyAny>) = run.extract()?;
-        let array = array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?;
-        Ok(Input {
-            field: &row.name,
-            columns: first..first + array.shape()[1],
-            array: Array::F64(array),
-        })
-    });
-    inputs.collect()
 }
 
 impl Inputs<'_, '_> {

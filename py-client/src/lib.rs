@@ -86,6 +86,8 @@ mod core {
     #[pymodule_export]
     use super::ik::{Ik, IkTaskSolver};
     #[pymodule_export]
+    use super::input::Columns;
+    #[pymodule_export]
     use super::observe::{Evaluation, Playback};
     #[pymodule_export]
     use super::parts::{parts, visual_mesh};
@@ -106,6 +108,8 @@ mod core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         sim_daemon::keep_meshes();
+        let not_ready = module.py().get_type::<super::input::NotReady>();
+        module.add("NotReady", not_ready)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tightloop as tl
+from tightloop import _core
 from tightloop.sim.command_rows import COMMANDS, CommandRow
 
 WORLDS = 3
@@ -87,9 +88,11 @@ def test_arrays_that_fit_are_taken_without_a_conversion(sim, row):
     assert columns == len(names) * parts > 0
     shape = (WORLDS, len(names), parts) if parts > 1 else (WORLDS, len(names))
     for dtype in (np.float32, np.float64):
-        assert sim._client.unready({row.name: np.zeros(shape, dtype)}) == []
-    assert sim._client.unready({row.name: np.zeros(shape, np.int64)}) == [row.name]
-    assert sim._client.unready({row.name: np.zeros(shape[1:])}) == [row.name]
+        sim._client.step({row.name: np.zeros(shape, dtype)}, None)
+    for other in (np.zeros(shape, np.int64), np.zeros(shape[1:]), np.zeros((*shape, 1)), np.zeros(shape).tolist()):
+        with pytest.raises(_core.NotReady) as refused:
+            sim._client.step({row.name: other}, None)
+        assert refused.value.args == ([row.name],)
 
 
 @pytest.mark.parametrize("row", COMMANDS.values(), ids=lambda row: row.name)

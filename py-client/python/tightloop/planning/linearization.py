@@ -30,7 +30,7 @@ from tightloop.planning.plans import check_alike, varying
 from tightloop.planning.rotations import rotations
 from tightloop.planning.tangent import Tangent
 from tightloop.scene.scene import Scene
-from tightloop.sim.command_arrays import ready_arrays
+from tightloop.sim.command_arrays import called
 from tightloop.sim.launching import launch
 from tightloop.sim.sim import Sim
 
@@ -234,7 +234,7 @@ class _Run:
 
     def _write(self, values: dict[str, Array]) -> Any:
         """Write values to all worlds; return a frame there."""
-        return self._planner._client.write(ready_arrays(self._planner, dict(values)), None, True)
+        return called(self._planner, self._planner._client.write, values, None, True)
 
     def _check_status(self, frame: Any, state: Any, row: Any, labels: Sequence[str]) -> None:
         faulted = np.flatnonzero((frame.status & FAULTED) != 0)

@@ -120,11 +120,12 @@ class Params:
         return self._write(params, mask)
 
     def _write(self, params: Mapping[str, ArrayLike], mask: ArrayLike | None, *, entries: bool = False) -> Frame:
-        given = {name: self.ready_columns(name, value) for name, value in params.items()}
+        runs = {name: self.ready_columns(name, value) for name, value in params.items()}
         worlds = None if mask is None else as_mask("mask", mask, self._worlds)
         if self._advice is not None:
-            self._advice.look(given, worlds, self._columns, entries=entries)
-        return self._client.write(given, worlds, False)
+            arrays = {name: own[0][1] for name, own in runs.items() if own}
+            self._advice.look(arrays, worlds, self._columns, entries=entries)
+        return self._client.write({name: _core.Columns(own) for name, own in runs.items()}, worlds, False)
 
     def _columns(self, name: str) -> NDArray[Any]:
         """Return a parameter as it is, shape ``(worlds, columns)``, in memory of its own."""
@@ -132,15 +133,14 @@ class Params:
         first = self._numbers - self._known[name]["place"]
         return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
 
-    def ready_columns(self, name: str, value: Any) -> NDArray[np.float64] | Runs:
-        """Convert a value as `ready` does or, of a command's dict by robot, body or pattern, to runs of columns."""
-        if name not in COMMANDS or not isinstance(value, Mapping):
-            return self.ready(name, value)
-        self._varying(name)
-        names, _, parts, robots = self._layout(name)
-        if robots is None:
-            return self.ready(name, value)
-        return named_columns(name, value, self._worlds, names, robots, parts=parts)
+    def ready_columns(self, name: str, value: Any) -> Runs:
+        """Convert a value as `ready` does; that of a command may be a dict by robot, body or pattern."""
+        if name in COMMANDS and isinstance(value, Mapping):
+            self._varying(name)
+            names, _, parts, robots = self._layout(name)
+            if robots is not None:
+                return named_columns(name, value, self._worlds, names, robots, parts=parts)
+        return [(0, self.ready(name, value))]
 
     def ready(self, name: str, value: Any) -> NDArray[np.float64]:
         """Convert a value of a parameter to a contiguous float64 array, shape ``(worlds, columns)``.

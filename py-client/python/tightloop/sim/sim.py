@@ -32,7 +32,7 @@ from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.planning.inverse_kinematics import IkSolver
 from tightloop.planning.rollouts import Rollout
 from tightloop.scene.sensors import slices_by_name
-from tightloop.sim.command_arrays import Command, ready_arrays, step_arguments
+from tightloop.sim.command_arrays import Command, called, commanded
 from tightloop.sim.companions import Companion, end
 from tightloop.sim.daemon import Daemon
 from tightloop.sim.params import Params
@@ -176,7 +176,7 @@ class Sim(Attributes):
             "eq_active": eq_active,
             "body_f": body_f,
         }
-        return self._client.step(*step_arguments(self, given))
+        return commanded(self, self._client.step, given)
 
     def send(
         self,
@@ -219,7 +219,7 @@ class Sim(Attributes):
             "eq_active": eq_active,
             "body_f": body_f,
         }
-        self._client.send(*step_arguments(self, given))
+        commanded(self, self._client.send, given)
 
     def recv(self) -> Frame:
         """Wait for the frame of the step that `send` began. After Ctrl-C it may be called again.
@@ -273,12 +273,11 @@ class Sim(Attributes):
         worlds = None if mask is None else as_mask("mask", mask, self.worlds)
         seeds = None if seed is None else as_seed(seed, self.worlds)
         if keyframe is None:
-            states = ready_arrays(self, {"joint_q": joint_q, "joint_qd": joint_qd})
-            return self._client.reset(worlds, seeds, states)
+            return called(self, self._client.reset, {"joint_q": joint_q, "joint_qd": joint_qd}, worlds, seeds)
         keyframes.check_alone(joint_q, joint_qd)
-        states = ready_arrays(self, keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe)))
-        self._client.reset(worlds, seeds, {})
-        return self._client.write(states, worlds, True)
+        states = keyframes.arrays(keyframes.find(self.info["keyframes"], keyframe))
+        self._client.reset({}, worlds, seeds)
+        return called(self, self._client.write, states, worlds, True)
 
     def write(
         self,
@@ -324,7 +323,7 @@ class Sim(Attributes):
             "eq_active": eq_active,
         }
         worlds = None if mask is None else as_mask("mask", mask, self.worlds)
-        return self._client.write(ready_arrays(self, given), worlds, False)
+        return called(self, self._client.write, given, worlds, False)
 
     def forward(self) -> Frame:
         """Return a frame at the current state and commands without a step. Raises as `step` does."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.arrays.inputs import reals
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
-from tightloop.sim.command_arrays import ready_arrays
+from tightloop.sim.command_arrays import called
 
 if TYPE_CHECKING:
     from tightloop.env.episodes.starts import Starts
@@ -62,7 +62,7 @@ class SettableState:
         given = [_rows(name, array, self.num_envs) for name, array in (("qpos", qpos), ("qvel", qvel))]
         arrays = {name: np.ascontiguousarray(array) for name, array in self.task.states_of(*given).items()}
         # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
-        frame = self.sim._client.write(ready_arrays(self.sim, arrays), np.ascontiguousarray(every), True)
+        frame = called(self.sim, self.sim._client.write, arrays, np.ascontiguousarray(every), True)
         self._see(frame)
         self._memory.begin(np.flatnonzero(every), self.evaluation)
         self._see(frame)

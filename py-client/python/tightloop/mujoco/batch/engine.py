@@ -22,7 +22,7 @@ from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.joints import JointMap
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.scene.scene import Scene
-from tightloop.sim.command_arrays import ready_arrays
+from tightloop.sim.command_arrays import called
 from tightloop.sim.launching import launch
 from tightloop.sim.sim import Sim
 from tightloop.sim.snapshot import Snapshot
@@ -223,7 +223,7 @@ class Engine:
 
     def _write_states(self, parts: dict[str, Array], mask: Mask | None = None) -> Frame:
         """Write states of MuJoCo's order, which the warnings of quaternions in another order would not fit."""
-        return self.sim._client.write(ready_arrays(self.sim, parts), mask, True)
+        return called(self.sim, self.sim._client.write, parts, mask, True)
 
     def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
         """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
