@@ -165,20 +165,6 @@ impl<'py> Array<'py> {
     }
 }
 
-impl Input<'_, '_> {
-    fn command(&self) -> PyResult<Command<'_>> {
-        let values = match &self.array {
-            Array::F32(array) => Values::F32(array.as_slice()?),
-            Array::F64(array) => Values::F64(array.as_slice()?),
-        };
-        Ok(Command {
-            field: self.field,
-            columns: self.columns.clone(),
-            values,
-        })
-    }
-}
-
 impl InputTable {
     /// Takes values by name, as arrays that are copied once.
     ///
@@ -269,7 +255,18 @@ impl InputTable {
 impl Inputs<'_, '_> {
     /// The arrays as the protocol takes them.
     pub(crate) fn commands(&self) -> PyResult<Vec<Command<'_>>> {
-        self.0.iter().map(Input::command).collect()
+        let commands = self.0.iter().map(|input| {
+            let values = match &input.array {
+                Array::F32(array) => Values::F32(array.as_slice()?),
+                Array::F64(array) => Values::F64(array.as_slice()?),
+            };
+            Ok(Command {
+                field: input.field,
+                columns: input.columns.clone(),
+                values,
+            })
+        });
+        commands.collect()
     }
 }
 
