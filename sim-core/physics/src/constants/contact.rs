@@ -161,7 +161,7 @@ pub enum FrictionCombine {
 impl FrictionCombine {
     /// The coefficient of a pair.
     #[inline(always)]
-    pub fn of<F: Num>(self, a: F, b: F) -> F {
+    pub fn coefficient<F: Num>(self, a: F, b: F) -> F {
         match self {
             FrictionCombine::Max => a.max(b),
             FrictionCombine::Mean => (a + b) * F::c(0.5),

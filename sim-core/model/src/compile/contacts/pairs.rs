@@ -87,11 +87,10 @@ impl ContactBuilder<'_> {
         row[pair::SIZE_B..][..3].copy_from_slice(&b.size);
         row[pair::FLIP] = if sides.flipped { -1.0 } else { 1.0 };
         row[pair::MARGIN] = margin;
-        let mu = geom
-            .as_ref()
-            .map_or(self.scene.friction_combine.of(s.mu, t.mu), |geom| {
-                geom.friction[0]
-            });
+        let mu = geom.as_ref().map_or(
+            self.scene.friction_combine.coefficient(s.mu, t.mu),
+            |geom| geom.friction[0],
+        );
         row[pair::MU] = mu.max(MU_MIN);
         let condim = geom
             .as_ref()

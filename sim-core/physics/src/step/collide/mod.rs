@@ -351,7 +351,7 @@ fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C:
     let a = cx.index(indices, p, pair::SOLID_A, table.rows);
     let b = cx.index(indices, p, pair::SOLID_B, table.rows);
     let (a, b) = (cx.load(table, a, 0), cx.load(table, b, 0));
-    let mut mu = t.combine.of(a, b);
+    let mut mu = t.combine.coefficient(a, b);
     // some pairs keep the larger coefficient, however the others combine theirs
     if t.keeps_max.rows > 0 {
         let keeps = C::F::c(0.5).lt(cx.constant(t.keeps_max, p, 0));
