@@ -317,6 +317,30 @@ fn one_line_in_ten_of_a_step_is_a_comment() {
 }
 
 #[test]
+fn names_say_what_they_are_of() {
+    let pronouns = [
+        "let own ",
+        "let mut own ",
+        "let found ",
+        "let mut found ",
+        "fn of(",
+        "fn of<",
+    ];
+    let mut wrong = Vec::new();
+    for path in sources()
+        .into_iter()
+        .chain(files("sim-core/record/src", ".rs"))
+    {
+        let lines = code(&path);
+        let named = lines
+            .iter()
+            .filter(|line| pronouns.iter().any(|name| begins_word(line, name)));
+        wrong.extend(named.map(|line| format!("{path}: {line}")));
+    }
+    assert!(wrong.is_empty(), "name what is held or made: {wrong:#?}");
+}
+
+#[test]
 fn the_list_of_stages_is_a_page() {
     let lines = read("sim-core/physics/src/step/mod.rs").lines().count();
     assert!(lines <= 130, "{lines} lines");
