@@ -122,6 +122,13 @@ machine!(
 /// The reference: double precision, of a model and states that are rounded to `f32`.
 pub fn double(m: &Constants<f64>, stage: StageId, given: &[Given]) -> Vec<Left> {
     assert!(available(Lanes::Scalar));
+    // one solver is compiled for it, with the code for torsional friction
+    let solvers = ["solver", "solver_turning"];
+    let needed = |other: &StageId| solvers.contains(&other.name()) && other.is_needed(m);
+    let stage = match solvers.contains(&stage.name()) {
+        true => StageId::all().find(needed).expect("a model needs one"),
+        false => stage,
+    };
     // SAFETY: as just asked.
     unsafe { run::<f64>(stages_f64::STAGES[stage.index()], m, stage, given) }
 }
