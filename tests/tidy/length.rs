@@ -105,11 +105,18 @@ fn files_have_at_most_400_lines_of_code() {
 fn folders_have_at_most_20_files() {
     let mut folders = BTreeMap::<String, usize>::new();
     let modules = files("sim-core/record/src", ".rs");
-    let endings = [".csv", ".md", ".onnx", ".png", ".py", ".rs", ".webp"];
-    let shown = ["docs", "examples"]
+    let others = [
+        ("docs", ".md"),
+        ("docs", ".py"),
+        ("docs", ".webp"),
+        ("examples", ".csv"),
+        ("examples", ".onnx"),
+        ("examples", ".png"),
+        ("examples", ".py"),
+    ];
+    let shown = others
         .into_iter()
-        .flat_map(|folder| endings.map(|ending| files(folder, ending)))
-        .flatten();
+        .flat_map(|(folder, ending)| files(folder, ending));
     for path in sources().into_iter().chain(modules).chain(shown) {
         let (folder, _) = path.rsplit_once('/').expect("it is in a folder");
         *folders.entry(folder.to_owned()).or_default() += 1;
