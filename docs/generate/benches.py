@@ -341,8 +341,8 @@ machines were busy.
 
 `make bench-gpu` measures MuJoCo-Warp and MJX too, where they are installed.
 
-- Every adapter below is named in the table of its source. Mesa's llvmpipe is a software driver: it runs on the CPU.
-- On llvmpipe, `device="gpu"` is slower than `device="cpu"` on the same cores. `GPU/CPU` shows the ratio.
+- The table of its source names each adapter. Mesa's llvmpipe is a software driver: it runs on the CPU.
+- In the results of llvmpipe, `device="gpu"` is slower than `device="cpu"` on the same cores. `GPU/CPU` shows the ratio.
 - A rate is of the median frame. `whole run` is of all frames: the grasp touches its cube in a third of them.
 - `cold` is the first build of a model, `cached` a later build.
 """,

@@ -33,7 +33,7 @@ _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(((?:\.\./)+[^)]+)\)")
 
 
 def page(name: str) -> str:
-    """A page as the site has it.
+    """A page as the site has it; `hooks` adds results to that of performance.
 
     Raises:
         LookupError: The page lacks the place of a part, or has one that no part is for.

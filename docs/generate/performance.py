@@ -2,7 +2,7 @@
 
     cd docs && python -m generate.performance     # rewrites the page and the table of README.md
 
-Both files are committed, so that a forge shows them. ``tests/python/docs/test_prose.py`` holds them to the results.
+Both files are committed, so that a forge shows them. ``tests/python/docs/test_docs.py`` holds them to the results.
 """
 
 from __future__ import annotations
@@ -68,25 +68,24 @@ def measured() -> list[Path]:
 
 
 def newest(results: list[Result], bench: Bench) -> str:
-    """The newest of a topic's results: its rows, then its file and those of other machines."""
+    """The newest of a topic's results: its rows, where they come from, and the files of other machines."""
     last = max(results, key=lambda result: result.facts.get("date", ""))
     others = ", ".join(f"{_link(result)} ({_machine(result)})" for result in results if result is not last)
-    source = f"Measured on {_machine(last)}: {_link(last)}."
-    return f"{_rows(last, bench)}\n{source}{f' Other machines: {others}.' if others else ''}\n"
+    return _with_source(last, bench) + (f"\nOther machines: {others}.\n" if others else "")
 
 
 def section(result: Result, bench: Bench) -> str:
     """A file: its rows, then where they come from."""
+    return f"### {bench.title.partition(',')[0]}: {_machine(result)}\n\n{_with_source(result, bench)}"
+
+
+def _with_source(result: Result, bench: Bench) -> str:
     facts = dict(result.facts)
     machine = facts.pop("cpu", result.path.parent.name)
     known = {"machine": machine, "results": _link(result), "commit": facts.pop("commit", "unknown")}
     known["command"] = f"`{_command_today(facts.pop('command', 'unknown'))}`"
-    return (
-        f"### {bench.title.partition(',')[0]}: {_machine(result)}\n\n"
-        + _rows(result, bench)
-        + "\n"
-        + table(["source", ""], [[name, value] for name, value in (known | facts).items()])
-    )
+    source = table(["source", ""], [[name, value] for name, value in (known | facts).items()])
+    return f"{_rows(result, bench)}\n{source}"
 
 
 def _rows(result: Result, bench: Bench) -> str:

@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 INTRODUCTION = """# Performance
 
-This page has the newest table of each topic. `make docs` builds it with the tables of all machines, and with the commit
-and command of each. Each table is a file of `benches/results`.
+Each table is a file of `benches/results`. The rows below a table name its machine, commit and command.
+
+<!-- forge -->
+
+This page has the newest table of each topic. `make docs` builds it with those of all machines.
+
+<!-- end -->
 
 - A *step* is one physics step of one world. Rates add up all worlds.
 - A *ratio* is the median over paired runs: both sides take turns in one run. So it can differ slightly from the

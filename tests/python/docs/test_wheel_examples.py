@@ -47,6 +47,10 @@ def test_a_copy_has_all_that_it_imports_and_runs(tmp_path):
     # with modules, data and a folder of results in the working directory
     done = call("tightloop.examples", "copy", "mpc", "mine", cwd=tmp_path)
     assert (tmp_path / "mine/planning/ilqr.py").is_file(), done.stderr
+    # of a package, the modules that it imports
+    done = call("tightloop.examples", "copy", "evaluation", "shown", cwd=tmp_path)
+    copied = sorted(str(path.relative_to(tmp_path / "shown")) for path in (tmp_path / "shown").rglob("*.*"))
+    assert copied == ["evaluation.py", "learning/__init__.py", "learning/program.py"], done.stderr
     done = call("tightloop.examples", "copy", "franka_lesson", "mine", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     lesson = [sys.executable, str(tmp_path / "mine/franka_lesson.py"), "--worlds", "2"]

@@ -89,7 +89,7 @@ def _parts(path: Path, seen: set[Path] | None = None) -> set[Path]:
     text = path.read_text(encoding="utf-8")
     for module in _imported(ast.parse(text)):
         beside = FOLDER / module.replace(".", "/")
-        for part in (beside.with_suffix(".py"), *sorted(beside.glob("*.py"))):
+        for part in (beside.with_suffix(".py"), beside / "__init__.py", beside.parent / "__init__.py"):
             if part.is_file():
                 _parts(part, seen)
     for data in _DATA:
@@ -101,9 +101,10 @@ def _parts(path: Path, seen: set[Path] | None = None) -> set[Path]:
 def _imported(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (name.name.partition(".")[0] for name in node.names)
+            yield from (name.name for name in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield node.module.partition(".")[0]
+            yield node.module
+            yield from (f"{node.module}.{name.name}" for name in node.names)
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -41,7 +41,7 @@ def called(sim: Any, call: Callable[..., Any], given: dict[str, Any], *rest: Any
 
 
 def commanded(sim: Any, call: Callable[..., Any], given: dict[str, Any]) -> Any:
-    """Call `step` or `send` of the client, with what a command leaves in device memory, as `called` does."""
+    """Leave commands of the GPU in device memory, then call `step` or `send` of the client as `called` does."""
     on_device = None
     if sim._card is not None:
         sim._client.land()  # the daemon may still read what the last step left there

@@ -134,7 +134,7 @@ class Params:
         return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
 
     def ready_columns(self, name: str, value: Any) -> Runs:
-        """Convert a value as `ready` does; that of a command may be a dict by robot, body or pattern."""
+        """Return runs of columns of a value, as `ready` converts it; that of a command may also be a dict, as in `step`."""
         if name in COMMANDS and isinstance(value, Mapping):
             self._varying(name)
             names, _, parts, robots = self._layout(name)

@@ -134,7 +134,7 @@ impl<const TURNS: bool> Stage for Solver<TURNS> {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        // half of what the reference takes to compile
+        // this instance would double the time that the reference takes to compile
         if !TURNS && <<C::F as Num>::Real as Real>::DOUBLE {
             unreachable!("no model needs it in double precision");
         }
