@@ -134,7 +134,7 @@ class Params:
         return np.array(self._state()[:, -first:][:, : self._known[name]["info"]["columns"]])
 
     def ready_columns(self, name: str, value: Any) -> Runs:
-        """Return runs of columns of a value, as `ready` converts it; that of a command may also be a dict, as in `step`."""
+        """Return runs of columns of a value, as `ready` converts it. That of a command may be a dict, as in `step`."""
         if name in COMMANDS and isinstance(value, Mapping):
             self._varying(name)
             names, _, parts, robots = self._layout(name)

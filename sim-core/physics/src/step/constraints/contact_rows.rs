@@ -237,7 +237,7 @@ impl<'a, C: Cx> Contact<'a, C> {
     ) {
         let (t, r) = (self.t, self.row);
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-        // r = distance - margin, and d(r)
+        // r - margin, and the impedance d there
         let distance = cx.load(t.memory.rows, r, row::DISTANCE);
         let position = distance - self.of_pair(cx, pair::MARGIN);
         let d = self.impedance(cx, m, position);
@@ -247,7 +247,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             _ => cx.load(t.memory.rows, r, row::MU),
         };
         let mu = mu * self.rubs;
-        // D₀ = d / ((1 - d) w), aref = -b v - k d r along the normal
+        // D₀ = d / ((1 - d) w), aref = -b v - k d (r - margin) along the normal
         let weight = self.of_pair(cx, pair::WEIGHT);
         let stiff = d.div((one - d) * weight);
         let damping = self.of_pair(cx, pair::DAMPING);

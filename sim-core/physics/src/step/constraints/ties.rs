@@ -264,7 +264,7 @@ fn write_rows<C: Cx>(
         // aref = -b v - k d r - J̇ q̇
         let spring = C::F::k(tie.soft.stiffness) * d * position[k];
         let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - measured.swing[k];
-        // by mask: other worlds of the block may act
+        // a select: the tie may act in other worlds of the block
         if let Some(active) = active {
             weight = C::F::select(active, weight, zero);
             aref = C::F::select(active, aref, zero);

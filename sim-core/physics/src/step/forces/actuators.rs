@@ -263,11 +263,11 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         let actuator = &m.actuators.all[k];
         // ∂force/∂v = g₂ input + b₂
         let input = input(cx, b, actuator, k);
-        let rate_factor = |which: Param, fixed: [<C::F as Num>::Real; 3]| {
+        let velocity_factor = |which: Param, fixed: [<C::F as Num>::Real; 3]| {
             param(m, &b.params, which, 3 * k + 2, fixed[2])
         };
-        let gain = rate_factor(Param::ActuatorGain, actuator.gain);
-        let slope = gain.fma(input, rate_factor(Param::ActuatorBias, actuator.bias));
+        let gain = velocity_factor(Param::ActuatorGain, actuator.gain);
+        let slope = gain.fma(input, velocity_factor(Param::ActuatorBias, actuator.bias));
         let mut damping = -(slope * dt);
         // a force at its bound does not change with the velocity: no damping in that world
         if let Some([least, most]) = actuator.force_range {
@@ -315,13 +315,13 @@ fn subtract_swing<C: Cx>(
         let w = &mut b.work;
         let arm = Vec3::zero() - w.rotation[k] * Vec3::constant(body.center);
         let swing = omega.cross(omega.cross(arm));
-        // J c: the swing has no angular part
+        // J swing: the swing has no angular part
         let mut sum = C::F::c(0.0);
         for i in 0..3 {
             let moment = w.actuator_moment[length.first + first + i];
             sum = moment.fma(swing[i], sum);
         }
-        // acceleration -= Jᵀ x J c
+        // acceleration -= Jᵀ x (J swing)
         for (place, &dof) in length.dofs.iter().enumerate() {
             if shared(m, dof, body.dof).is_some() {
                 let moment = w.actuator_moment[length.first + place];

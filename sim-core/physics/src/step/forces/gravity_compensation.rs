@@ -42,7 +42,6 @@ impl Stage for GravityCompensation {
 /// Writes the forces that hold bodies against gravity to `joint_force`.
 #[inline(always)]
 pub(in crate::step) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    // -g
     let up = -gravity(m, &b.params);
     let (w, params) = (&mut b.work, &b.params);
     link_forces::clear(w);

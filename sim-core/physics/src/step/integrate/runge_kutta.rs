@@ -173,7 +173,7 @@ fn go_on_acting<C: Cx, const K: usize>(cx: &mut C, m: &ConstantsOf<C>, b: &mut B
     let share = C::F::c(SHARES[K]);
     for activation in activations(m) {
         let (place, w) = (activation.place, &mut b.work);
-        // a of x, and Σ bₖ ȧₖ from 0
+        // activation of x, and Σ bₖ ȧₖ from 0
         if K == 0 {
             w.rk_act[place] = cx.get(&b.act[place]);
             w.rk_act_rate_sum[place] = C::F::c(0.0);
@@ -182,7 +182,7 @@ fn go_on_acting<C: Cx, const K: usize>(cx: &mut C, m: &ConstantsOf<C>, b: &mut B
         let (start, rate) = (w.rk_act[place], w.act_dot[place]);
         let sum = rate.fma(share, w.rk_act_rate_sum[place]);
         w.rk_act_rate_sum[place] = sum;
-        // a + h aₖ ȧₖ at a point, and `next`, which clamps, for the next state alone
+        // act + h aₖ ȧₖ at a point, and `next`, which clamps, for the next state alone
         let act = match REACHES.get(K) {
             Some(reach) => rate.fma(C::F::c(m.dt.to_f64() * reach), start),
             None => next(activation, start, sum),

@@ -91,7 +91,7 @@ impl Stage for Integrate {
         if m.prescribed_search().is_some() {
             keep_accelerations(cx, m, b);
         }
-        // free bodies that carry nothing, where the matrix has their inertia alone
+        // free bodies that carry nothing and were not solved apart: implicit in their gyroscopic force here
         for &body in &m.gyroscopic_bodies {
             gyroscopic(cx, m, b, body);
         }

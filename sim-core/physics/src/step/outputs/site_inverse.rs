@@ -59,7 +59,6 @@ fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
             s[i][i] = damping;
         }
         orthonormalize(&mut w.site_inverse[first..end], &mut s);
-        // S / λ
         let undamped = F::c(1.0).div(damping);
         for i in 0..SIX {
             for j in i..SIX {
@@ -75,7 +74,7 @@ fn inverse_jacobian<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
                     row[i] = q[j].fma(s[i][j], row[i]);
                 }
             }
-            // the inverse of Rᵀ J is J⁺ R: rotate both halves of the row into the axes of that frame
+            // with the other frame's axes A, the inverse of Aᵀ J is J⁺ A: rotate both halves of the row
             if let Some(other) = &site.relative_to {
                 let [x, y, z, turn_x, turn_y, turn_z] = row;
                 let Vec3([x, y, z]) = to_local(w, other, Vec3([x, y, z]));

@@ -71,14 +71,14 @@ impl Stage for Imu {
 fn site_q<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
-        // p, q and v of the site in world axes, with p from the reference point of its robot
+        // position p, orientation and velocity of the site in world axes, p from the reference point of its robot
         let (mut position, mut orientation) = (position(w, mount), orientation(w, mount));
         let mut velocity = velocity(w, mount, position);
         match &site.relative_to {
             // only a position in the world contains the reference point, which may be large
             None => position = position + reference(w, mount),
             Some(other) => {
-                // p', q', v' and ω' of the frame that the site is relative to
+                // p', orientation, v' and ω' of the frame that the site is relative to
                 let (there, from) = (self::position(w, other), self::orientation(w, other));
                 let Spatial([linear, angular]) = self::velocity(w, other, there);
                 // p - p': on one robot the reference points cancel, so only robots apart subtract them
@@ -112,7 +112,7 @@ fn imu<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let w = &mut b.work;
     for (k, site) in m.sites.iter().enumerate() {
         let mount = &site.mount;
-        // a(b) + α × s + ω × (ω × s), with s = R p from the origin of the body
+        // a(b) + α × s + ω × (ω × s), with s the mount's position from the origin of the body, in world axes
         let (acceleration, omega) = match mount.body {
             Some(body) => {
                 let arm = w.rotation[body] * Vec3::constant(mount.position);

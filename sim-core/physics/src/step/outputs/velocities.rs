@@ -22,7 +22,6 @@ impl Stage for Velocities {
         let w = &mut b.work;
         for (k, frame) in m.frames.iter().enumerate() {
             let center = Vec3::constant(frame.center);
-            // a static link stays where it is
             let Some(body) = frame.body else {
                 w.link_center[k] = center;
                 w.body_qd[k] = Spatial::zero();

@@ -18,7 +18,7 @@ pub(super) struct Island<'a, F: Num> {
     pub search: &'a Search<F::Real>,
     /// The label of each dof's island: see [`super::islands`].
     pub labels: &'a [F],
-    /// That of this island.
+    /// The label of this island.
     pub label: F,
 }
 

@@ -98,7 +98,6 @@ fn law_along<C: Cx, const TURNS: bool>(
             state: law.state,
         };
     }
-    // three rows: normal and tangents
     let (jar, jv) = (cx.load3(rows, r, row::JAR), cx.load3(rows, r, row::AHEAD));
     let mut there = jar;
     for i in 0..3 {
@@ -263,7 +262,6 @@ pub(super) fn forces<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>, jo
     for (k, class) in t.classes.iter().enumerate() {
         let list = class_list(cx, t, k);
         each!(cx, r in list, {
-            // f = -s' at the accelerations found, 0 in worlds without this contact; then its Jᵀ f
             if let Some(block) = block_of::<_, TURNS>(class) {
                 let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
                 let law = turning::law_at(cx, t, r, block, jar, None);

@@ -25,13 +25,13 @@ pub(super) fn find<C: Cx>(
     acting: Acting,
 ) {
     let w = &mut b.work;
-    let (island, weight) = (&mut w.island, &w.row_weight);
+    let (labels, weight) = (&mut w.island, &w.row_weight);
     let dofs = m.dofs.len();
     // each tree by itself, and not constrained yet: its first dof + n
-    for (island, root) in island.iter_mut().zip(&search.roots) {
-        *island = C::F::c((root + dofs) as f64);
+    for (label, root) in labels.iter_mut().zip(&search.roots) {
+        *label = C::F::c((root + dofs) as f64);
     }
-    let mut links = Links { search, island };
+    let mut links = Links { search, labels };
     let zero = C::F::c(0.0);
     let mut r = 0;
     // a row with D > 0 constrains its trees; an equality makes one island of its two trees
@@ -59,8 +59,8 @@ pub(super) fn find<C: Cx>(
     // MuJoCo's option `island` is off: all dofs are one island where any constraint acts
     if !search.islands {
         let constrained = links.any_constrained::<C>();
-        for island in &mut *links.island {
-            *island = C::F::select(constrained, zero, *island);
+        for label in &mut *links.labels {
+            *label = C::F::select(constrained, zero, *label);
         }
     }
 }
@@ -68,7 +68,7 @@ pub(super) fn find<C: Cx>(
 /// The islands of all dofs, while constraints are added.
 struct Links<'a, F: Num> {
     search: &'a Search<F::Real>,
-    island: &'a mut [F],
+    labels: &'a mut [F],
 }
 
 impl<F: Num> Links<'_, F> {
@@ -85,10 +85,10 @@ impl<F: Num> Links<'_, F> {
         }
         // the lowest label of these trees, n subtracted: a constraint acts on them now
         let roots = dofs.into_iter().map(|dof| self.search.roots[dof]);
-        let count = F::c(self.island.len() as f64);
+        let count = F::c(self.labels.len() as f64);
         let mut least = count + count;
         for root in roots.clone() {
-            let current = self.island[root];
+            let current = self.labels[root];
             least = least.min(F::select(current.lt(count), current, current - count));
         }
         // each dof with the label of one of these trees gets it; roots that repeat are skipped
@@ -98,10 +98,10 @@ impl<F: Num> Links<'_, F> {
                 continue;
             }
             last = Some(root);
-            let from = self.island[root];
-            for island in &mut *self.island {
-                let moves = acts & is_island(*island, from);
-                *island = F::select(moves, least, *island);
+            let from = self.labels[root];
+            for label in &mut *self.labels {
+                let moves = acts & is_island(*label, from);
+                *label = F::select(moves, least, *label);
             }
         }
     }
@@ -109,10 +109,10 @@ impl<F: Num> Links<'_, F> {
     /// Whether any constraint acts.
     fn any_constrained<C: Cx<F = F>>(&self) -> MaskOf<C> {
         // a label below n: see `add`
-        let count = F::c(self.island.len() as f64);
+        let count = F::c(self.labels.len() as f64);
         let mut least = count;
-        for island in &*self.island {
-            least = least.min(*island);
+        for label in &*self.labels {
+            least = least.min(*label);
         }
         least.lt(count)
     }

@@ -41,8 +41,8 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
     let dofs = m.dofs.len();
-    // trees that no constraint acts on end at M⁻¹ τ; the others begin at the start that was chosen,
-    // and their island is busy at its first dof
+    // trees that no constraint acts on end at M⁻¹ τ, the others begin at the chosen start.
+    // An island is marked busy at its first dof
     find(cx, m, problem.search, b, problem.acting);
     for j in 0..dofs {
         let constrained = b.work.island[j].lt(C::F::c(dofs as f64));
@@ -56,7 +56,7 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
     // iterations, until no island of any world is busy
     times!(cx, m.solver.iterations, {
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
-        // Jᵀ f at a, then H and its minimum a⁺
+        // Jᵀ f at a, then the quadratic model and its minimum a⁺
         constraint_forces::<C, TURNS>(cx, m, b, problem.acting);
         model_cost::<C, TURNS>(cx, m, b, problem.acting, problem.corrects, None);
         minimize_model::<C, TURNS>(cx, m, b, problem.corrects, problem.coupling, None, None);

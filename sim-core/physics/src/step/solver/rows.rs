@@ -203,7 +203,7 @@ pub(super) fn residual<F: Num>(
 /// f + W J a, or f alone where the solver `corrects`.
 #[inline(always)]
 pub(super) fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
-    // f + W J a, with J a = jar + aref
+    // J a = jar + aref
     let whole = law.stiffness.fma(jar + aref, law.force);
     match corrects {
         Some(corrects) => F::select(corrects, law.force, whole),

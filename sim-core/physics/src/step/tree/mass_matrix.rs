@@ -74,7 +74,7 @@ impl Stage for MassMatrix {
                 w.inertia[parent] = w.inertia[parent] + composite.moved(w.arm[k]);
             }
         }
-        // a drive's armature is on the diagonal. That of free joints belongs to MuJoCo's velocities, so it is not
+        // a drive's armature is on the diagonal. `add_armature` adds that of MuJoCo's free joints
         for &j in &m.diagonal_dofs {
             let diagonal = m.pattern.at(j, j);
             let armature = param(m, params, Param::JointArmature, j, m.dofs[j].armature);

@@ -71,7 +71,7 @@ impl<'a, F: Num> HullFace<'a, F> {
             cx.put(&mut at, F::select(old.lt(facing), number, kept));
             cx.put(&mut best, old.max(facing));
         });
-        // its normal in the frame of the pair, and its rows in the table of corners
+        // its normal in the frame that the pose is in, and its rows in the table of corners
         let at = cx.get(&at);
         let m = pick3(cx, faces, at, 0);
         HullFace {

@@ -135,7 +135,6 @@ pub(in crate::step::collide) fn bounding_box_axis<F: Num, R: Reach<F>>(
     other: &R,
 ) -> SeparatingAxis<F> {
     let (axes, center) = (&pose.axes, pose.center);
-    // the hull as its bounding box
     let box_reach = BoxReach(half);
     // line of centres, from the other to the hull: n = -center/|center|, or z where centres coincide
     let length = center.dot(center).sqrt();

@@ -177,12 +177,11 @@ impl<F: Num> Prism<F> {
         half: Half<F::Mask>,
         lattice: &Lattice<F>,
     ) -> Prism<F> {
-        // heights of the corners
         let [p, q, k] = [top[0][2], top[1][2], top[2][2]];
         let [x, y] = lattice.inverse;
         // how much the top falls along x and y
         let (u, v) = (half.pick(k - q, p - k) * x, half.pick(p - k, k - q) * y);
-        // the top's normal is (u, v, 1), of unit length
+        // the top's normal is (u, v, 1), scaled to unit length
         let unit = F::c(1.0).div(u.fma(u, v.fma(v, F::c(1.0))).sqrt());
         let side = half.pick(F::c(1.0), F::c(-1.0));
         // QK runs along x and KP along y in the upper left prism, the other way round in the lower right one
@@ -298,7 +297,7 @@ impl<F: Num> Prism<F> {
         search.offer_side(pq, u, x, self.bottom);
         search.offer_side(qk, v, x, self.bottom);
         search.offer_side(kp, w, x, self.bottom);
-        // straight down to the bottom; elsewhere the place is too far to be nearer
+        // a point below the bottom is nearest to it straight above. Elsewhere the place is too far to be nearer
         let below = !zero.lt(beyond[1].max(beyond[2]).max(beyond[3])) & zero.lt(beyond[4]);
         let place = Vec3([x[0], x[1], F::select(below, self.bottom, c(1e16))]);
         search.offer(place, x);

@@ -358,7 +358,7 @@ impl<C: Cx> Best<C> {
 #[inline(always)]
 fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Points<C>) {
     let (c, table) = (C::F::c, candidates.table);
-    // lengths count by the radius of the shape
+    // lengths are divided by the radius of the shape
     let scale = c(1.0).div(size * size);
     let inverse = c(1.0).div(size);
     // scores begin above any squared distance: the deepest wins first, and later minima do not depend on them
@@ -380,7 +380,7 @@ fn keep_some<C: Cx>(cx: &mut C, candidates: &Points<C>, size: C::F, out: &mut Po
         cx.set(&mut best.score, c(SPREAD));
         each!(cx, at in candidates.list, {
             let other = Candidate::read(cx, table, at);
-            // squared distance in place, by the radius, and in normal
+            // squared distance in place, divided by the squared radius, and in normal
             let (way, turn) = (other.place - kept.place, other.normal - kept.normal);
             let apart = way.dot(way).fma(scale, turn.dot(turn));
             let score = cx.load(table, at, SCORE).min(apart);

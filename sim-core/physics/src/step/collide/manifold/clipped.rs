@@ -230,7 +230,7 @@ fn add_chosen<C: Cx>(
         // from the view to the frame of the second shape, then to that of the pair
         let point = u.scale_add(x, v.scale_add(y, n.scale_add(height, near.point)));
         let point = frame.axes.mul_add(point, frame.center);
-        // the first point always exists; of the others those that widened the contact
+        // the first point exists within the margin, the others where they widened the contact
         let is = match k {
             0 => distance.lt(pair.margin),
             _ => c(0.5).lt(cx.get(&chosen.exists[k - 1])),

@@ -232,7 +232,7 @@ fn best_axis<F: Num>(
     );
     // of length 1, towards the centre of B
     let product = product * (inverse * sign(product.dot(faces.center[0])));
-    // cosine between edge axis and face axis: bⱼ in the axes of A is a column of cosines
+    // cosine between edge axis and face axis: bⱼ in the axes of A is a row of cosines
     let of_b = c(2.5).lt(faces.code);
     let index = faces.code - F::select(of_b, c(3.0), c(0.0));
     let facing = column_at(index, columns);

@@ -167,7 +167,7 @@ impl<F: Num> Beside<F> {
         for j in 0..3 {
             // of the other two axes the lower changes first, so that of equals MuJoCo's is taken
             let (u, v) = [(1, 2), (0, 2), (0, 1)][j];
-            // squared length of the axis across the edge; an axis along the edge is nearest to other features
+            // squared length of half the axis across the edge. An axis along the edge is nearest to other features
             let across = h[u].fma(h[u], h[v] * h[v]);
             let crosses = !(half[j] * half[j] * across).lt(F::c(PARALLEL));
             let inverse = one.div(F::select(crosses, across, one));

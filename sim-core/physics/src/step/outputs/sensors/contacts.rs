@@ -264,7 +264,7 @@ fn records<C: Cx>(
             let pair = cx.load(m.contacts.memory.rows, r, row::PAIR);
             turn(m, b, contact_sensor, pair, &mut contact);
             let is_found = matches::<C>(b, contact_sensor, &contact);
-            // slots are sorted by rising keys: depth, size of the force, or order of the rows
+            // slots are sorted by rising keys: distance, -|F|², or the count of contacts so far
             let key = match contact_sensor.reduction {
                 Reduction::LeastDistance => contact.distance,
                 Reduction::LargestForce => -contact.force.dot(contact.force),
@@ -325,7 +325,7 @@ fn show<F: Num>(
         .zip(contact_sensor.shows)
         .map(|(size, shows)| size * usize::from(shows))
         .sum();
-    // the parts that are shown stand side by side; the count is no part of the record
+    // the sensor's parts follow each other. The record does not contain the count
     let (mut place, mut first) = (sensor.first + slot * width, 0);
     for (part, (size, shows)) in sizes.into_iter().zip(contact_sensor.shows).enumerate() {
         let scalars = match part {
@@ -372,7 +372,7 @@ fn net_force<C: Cx>(
             for (first, part) in [(2, force), (5, moment), (8, point)] {
                 more[first..first + 3].copy_from_slice(&part.0);
             }
-            // worlds whose contact is of another pair add 0
+            // worlds whose contact does not count add 0
             for (sum, x) in sums.iter_mut().zip(more) {
                 let whole = cx.get(sum) + C::F::select(is_found, x, zero);
                 cx.set(sum, whole);

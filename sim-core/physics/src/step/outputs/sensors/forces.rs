@@ -42,13 +42,13 @@ impl Stage for Accelerations {
         proper_accelerations(cx, m, b);
         let w = &mut b.work;
         for sensor in &m.sensors.all {
-            let SensorKind::Acceleration(frame) = &sensor.kind else {
+            let SensorKind::Acceleration(acceleration_sensor) = &sensor.kind else {
                 continue;
             };
             // a(b) + α × s + ω × (ω × s), with s from the origin of the body
-            let Spatial([linear, angular]) = match frame.of.body {
+            let Spatial([linear, angular]) = match acceleration_sensor.of.body {
                 Some(body) => {
-                    let arm = w.rotation[body] * Vec3::constant(frame.of.position);
+                    let arm = w.rotation[body] * Vec3::constant(acceleration_sensor.of.position);
                     let at = point_acceleration(w.force[body], w.velocity[body][ANGULAR], arm);
                     Spatial([at, w.force[body][ANGULAR]])
                 }
@@ -56,9 +56,13 @@ impl Stage for Accelerations {
                 None => Spatial::zero(),
             };
             // the part that is asked for, in world axes or in those of the frame
-            let mut vector = if frame.is_angular { angular } else { linear };
-            if frame.is_local {
-                vector = to_local(w, &frame.of, vector);
+            let mut vector = if acceleration_sensor.is_angular {
+                angular
+            } else {
+                linear
+            };
+            if acceleration_sensor.is_local {
+                vector = to_local(w, &acceleration_sensor.of, vector);
             }
             put(&mut w.sensordata, sensor, &vector.0);
         }
@@ -86,22 +90,22 @@ impl Stage for Wrenches {
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for sensor in &m.sensors.all {
-            let SensorKind::Wrench(wrench) = &sensor.kind else {
+            let SensorKind::Wrench(wrench_sensor) = &sensor.kind else {
                 continue;
             };
             // the wrench (N, F) from parent to body, with N about the centre of mass of the tree
-            let [x, y, z, u, v, w] = b.work.cfrc_int[wrench.body];
+            let [x, y, z, u, v, w] = b.work.cfrc_int[wrench_sensor.body];
             let (torque, force) = (Vec3([x, y, z]), Vec3([u, v, w]));
             // the torque about the site
-            let body = &m.outputs.bodies[wrench.body];
+            let body = &m.outputs.bodies[wrench_sensor.body];
             // arm of the site from there: the torque about the site is N - r × F
-            let arm = position(&b.work, &wrench.site) - root_center(m, b, body);
-            let vector = if wrench.is_torque {
+            let arm = position(&b.work, &wrench_sensor.site) - root_center(m, b, body);
+            let vector = if wrench_sensor.is_torque {
                 torque - arm.cross(force)
             } else {
                 force
             };
-            let local = to_local(&b.work, &wrench.site, vector);
+            let local = to_local(&b.work, &wrench_sensor.site, vector);
             put(&mut b.work.sensordata, sensor, &local.0);
         }
     }
