@@ -188,7 +188,7 @@ fn deepest_vertex<C: Cx>(
     let mut rank = cx.var(c(0.0));
     let mut place = cx.var(c(0.0));
     each_low_row!(cx, n, limit, hull, row, {
-        // place of a vertex: four a row
+        // place of a vertex: four per row
         let number = cx.number(row) * c(4.0);
         let ranks: [C::F; 4] = cx.constants(hull.tables.ranks, row, 0);
         for (k, point) in vertex_row(cx, hull.tables, row).into_iter().enumerate() {
