@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -119,12 +119,12 @@ pyo3::create_exception!(
 
 /// Values of a command or state that Python has converted: runs of neighbouring columns, each with its first column.
 #[pyclass(frozen, module = "tightloop._core")]
-pub(crate) struct Columns(Vec<(usize, Py<PyArrayDyn<f64>>)>);
+pub(crate) struct Columns(Vec<(usize, Py<PyArray2<f64>>)>);
 
 #[pymethods]
 impl Columns {
     #[new]
-    fn new(runs: Vec<(usize, Py<PyArrayDyn<f64>>)>) -> Columns {
+    fn new(runs: Vec<(usize, Py<PyArray2<f64>>)>) -> Columns {
         Columns(runs)
     }
 }
@@ -213,7 +213,7 @@ impl InputTable {
         }
         if let Ok(columns) = value.cast::<Columns>() {
             for (first, values) in &columns.get().0 {
-                let values = values.bind(value.py()).try_readonly()?;
+                let values = values.bind(value.py()).to_dyn().try_readonly()?;
                 inputs.push(Input {
                     field: &row.name,
                     columns: *first..first + values.shape()[1],
