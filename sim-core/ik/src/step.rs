@@ -101,6 +101,8 @@ fn solve_free<F: Lane>(
     s: &mut Solve<F>,
 ) {
     let one = F::c(1.0);
+    // the factorisation reads zeros of the pattern too, where an overflow of an earlier attempt may have left NaN
+    s.system.fill(F::c(0.0));
     for v in 0..t.coord_of.len() {
         s.delta[v] = -gradient[v];
     }

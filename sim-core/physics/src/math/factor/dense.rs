@@ -36,7 +36,7 @@ pub(super) fn factor<F: Num>(size: usize, a: &mut [F], x: &mut [F]) {
     tile!(size, 0, eliminate_0(a, x));
 }
 
-/// Functions that remove the S rows from P on from those above, one by one.
+/// Functions that remove the S rows from P on from those above, a tile at a time.
 macro_rules! eliminate {
     ($($name:ident $($i:literal)*;)*) => {
         $(
@@ -45,17 +45,32 @@ macro_rules! eliminate {
                 let (above, entries) = a[..tri(p + S, 0)].split_at_mut(tri(p, 0));
                 let (x_above, x) = x[..p + S].split_at_mut(p);
                 let mut tile = Removed::<F, S>::new(entries, p, x);
-                $(tile.subtract_from(&mut above[tri($i, 0)..tri($i + 1, 0)], &mut x_above[$i]);)*
+                $(subtract_from_tile::<F, S>($i, above, &mut tile, x_above);)*
             }
         )*
     };
 }
 
 eliminate!(
-    eliminate_9 8 7 6 5 4 3 2 1 0;
-    eliminate_6 5 4 3 2 1 0;
-    eliminate_3 2 1 0;
+    eliminate_9 6 3 0;
+    eliminate_6 3 0;
+    eliminate_3 0;
 );
+
+/// Subtracts S rows from those of the tile that begins at row `i`.
+#[inline(always)]
+fn subtract_from_tile<F: Num, const S: usize>(
+    i: usize,
+    above: &mut [F],
+    removed: &mut Removed<'_, F, S>,
+    x: &mut [F],
+) {
+    let rows = &mut above[tri(i, 0)..tri(i + TILE, 0)];
+    let (first, rest) = rows.split_at_mut(i + 1);
+    let (second, third) = rest.split_at_mut(i + 2);
+    let places = [i, i + 1, i + 2];
+    removed.subtract_from(i, std::iter::once(0..i), [first, second, third], x, places);
+}
 
 /// The S rows of the first tile, which has none above it.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Which entries of a symmetric matrix may differ from zero, and where they are kept.
 
-use super::{dense, tree, tri};
+use super::{dense, general, tree, tri};
 use std::collections::BTreeSet;
 
 /// Entries that may differ from zero, fill included, and where they are kept.
@@ -26,6 +26,9 @@ pub struct Pattern {
     path_starts: Vec<usize>,
     /// Segments of the trees.
     segments: Vec<Segment>,
+    /// Tiles of the general blocks, and the columns of each above it, counted from the block's first.
+    tiles: Vec<Tile>,
+    tile_runs: Vec<Run>,
 }
 
 /// A part of the matrix that nothing couples to the rest.
@@ -43,6 +46,8 @@ pub(super) struct Block {
     pub kind: Kind,
     /// Its part of the segments, if it is no general one.
     segments: (usize, usize),
+    /// Its part of the tiles, if it is a general one.
+    tiles: (usize, usize),
 }
 
 /// Structure of a block, which decides how it is kept.
@@ -94,6 +99,17 @@ impl Segment {
     }
 }
 
+/// Rows of a general block that follow each other and are eliminated together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Tile {
+    /// Its first row, counted from the block's first.
+    pub first: usize,
+    /// Its number of rows.
+    pub size: usize,
+    /// Its part of the runs of tiles.
+    runs: (usize, usize),
+}
+
 /// A row of a tree.
 pub(super) struct Path<'a> {
     /// Rows on the path to the root, root first, counted from the block's first.
@@ -117,6 +133,9 @@ impl Pattern {
             path_rows,
             path_starts,
             segments,
+            // follow from the rows
+            tiles: _,
+            tile_runs: _,
         } = self;
         let blocks = blocks.iter().map(|block| {
             let Block {
@@ -126,6 +145,7 @@ impl Pattern {
                 len,
                 kind,
                 segments,
+                tiles: _,
             } = block;
             let kind = match kind {
                 Kind::Dense => "Dense",
@@ -225,9 +245,10 @@ impl Pattern {
             }
             self.path_bounds.push(self.path_rows.len());
         }
-        let segments = self.segments.len();
-        if kind != Kind::General {
-            self.add_segments(rows, first, offset);
+        let (segments, tiles) = (self.segments.len(), self.tiles.len());
+        match kind {
+            Kind::Dense | Kind::Tree => self.add_segments(rows, first, offset),
+            Kind::General => self.add_tiles(rows, first),
         }
         self.blocks.push(Block {
             first,
@@ -236,7 +257,27 @@ impl Pattern {
             len: self.len - offset,
             kind,
             segments: (segments, self.segments.len()),
+            tiles: (tiles, self.tiles.len()),
         });
+    }
+
+    /// Takes the rows of a general block [`general::TILE`] at a time, from the last on.
+    fn add_tiles(&mut self, rows: &[BTreeSet<usize>], first: usize) {
+        let mut end = rows.len();
+        while end > 0 {
+            let begin = end.saturating_sub(general::TILE);
+            // columns of any of them
+            let columns: BTreeSet<usize> = rows[begin..end].iter().flatten().copied().collect();
+            let above = columns.iter().map(|column| column - first);
+            let runs = self.tile_runs.len();
+            add_to_runs(&mut self.tile_runs, runs, above.filter(|&k| k < begin));
+            self.tiles.push(Tile {
+                first: begin,
+                size: end - begin,
+                runs: (runs, self.tile_runs.len()),
+            });
+            end = begin;
+        }
     }
 
     /// Cuts a tree where it branches, and its branches into even parts of at most [`tree::SEGMENT`] rows.
@@ -270,15 +311,11 @@ impl Pattern {
 
     fn add_runs(&mut self, row: &BTreeSet<usize>, first: usize) {
         let begin = self.runs.len();
-        for column in row.iter().map(|column| column - first) {
-            match self.runs[begin..].last_mut() {
-                Some(run) if run.end == column => run.end += 1,
-                _ => self.runs.push(Run {
-                    start: column,
-                    end: column + 1,
-                }),
-            }
-        }
+        add_to_runs(
+            &mut self.runs,
+            begin,
+            row.iter().map(|column| column - first),
+        );
         self.run_starts.push(self.runs.len());
     }
 
@@ -342,6 +379,18 @@ impl Pattern {
         &self.runs[self.run_starts[k]..self.run_starts[k + 1]]
     }
 
+    /// Tiles of a general block, the last rows first.
+    #[inline(always)]
+    pub(super) fn tiles(&self, block: &Block) -> &[Tile] {
+        &self.tiles[block.tiles.0..block.tiles.1]
+    }
+
+    /// Columns above a tile that any of its rows has.
+    #[inline(always)]
+    pub(super) fn columns_above(&self, tile: &Tile) -> &[Run] {
+        &self.tile_runs[tile.runs.0..tile.runs.1]
+    }
+
     /// Segments of a tree, in the order of their rows.
     #[inline(always)]
     pub(super) fn segments(&self, block: &Block) -> &[Segment] {
@@ -356,6 +405,19 @@ impl Pattern {
         Path {
             rows: &self.path_rows[bounds.clone()],
             starts: &self.path_starts[bounds],
+        }
+    }
+}
+
+/// Appends rising columns as runs; those before `begin` are complete.
+fn add_to_runs(runs: &mut Vec<Run>, begin: usize, columns: impl Iterator<Item = usize>) {
+    for column in columns {
+        match runs[begin..].last_mut() {
+            Some(run) if run.end == column => run.end += 1,
+            _ => runs.push(Run {
+                start: column,
+                end: column + 1,
+            }),
         }
     }
 }

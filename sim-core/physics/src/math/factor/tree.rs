@@ -4,10 +4,14 @@
 //! that follow each other on a path are taken up to [`SEGMENT`] at a time: an ancestor's scalar is then loaded and stored once
 //! for all of them, with less than half of the instructions (a step of a quadruped is 15 % faster). The root's rows are a
 //! full triangle, and run as [`super::dense`].
+//!
+//! The rows of a segment are subtracted from three ancestors at once, so that a row's scalar is loaded once for three products: one ancestor at a
+//! time takes four loads and a store for three products.
 
 use super::dense;
 use super::pattern::{Block, Path, Pattern};
 use crate::lane::Num;
+use std::ops::Range;
 
 /// Most rows of a segment that does not begin at the root: its own entries stay in registers.
 pub(super) const SEGMENT: usize = 3;
@@ -23,17 +27,17 @@ macro_rules! of_size {
     };
 }
 
-/// `f::<F, S, I>(…)` for every I below `n` and [`UNROLLED`], in descending order: a loop over a short row costs more
-/// than its arithmetic.
+/// `f::<F, S, I>(…)` for every I that begins [`AT_ONCE`] ancestors below `n` and [`UNROLLED`], in descending order: a loop over
+/// a short row costs more than its arithmetic.
 macro_rules! ancestors {
     ($n:expr, $f:ident($($arg:expr),*)) => {
-        ancestors!(@ $n, $f($($arg),*), 11 10 9 8 7 6 5 4 3 2 1 0)
+        ancestors!(@ $n, $f($($arg),*), 9 6 3 0)
     };
     (@ $n:expr, $f:ident $args:tt, $($i:literal)*) => {
         $(ancestors!(@one $n, $f $args, $i);)*
     };
     (@one $n:expr, $f:ident($($arg:expr),*), $i:literal) => {
-        if $i < $n {
+        if $i + AT_ONCE <= $n {
             $f::<F, S, $i>($($arg),*);
         }
     };
@@ -41,6 +45,8 @@ macro_rules! ancestors {
 
 /// Ancestors whose rows are unrolled.
 const UNROLLED: usize = 12;
+/// Ancestors from which rows are subtracted at once.
+const AT_ONCE: usize = 3;
 
 #[inline(always)]
 pub(super) fn solve<F: Num>(pattern: &Pattern, block: &Block, a: &mut [F], x: &mut [F]) {
@@ -88,9 +94,17 @@ fn eliminate<F: Num, const S: usize>(
 ) {
     let length = path.rows.len();
     let mut segment = Removed::<F, S>::new(entries, length, x);
-    for i in (UNROLLED..length).rev() {
+    // from the last ancestor on, so many that the others are a multiple
+    let mut i = length;
+    while !i.is_multiple_of(AT_ONCE) {
+        i -= 1;
         let target = &mut above[path.starts[i]..path.starts[i] + i + 1];
-        segment.subtract_from(target, &mut x_above[path.rows[i]]);
+        let columns = std::iter::once(0..i);
+        segment.subtract_from(i, columns, [target], x_above, [path.rows[i]]);
+    }
+    while i > UNROLLED {
+        i -= AT_ONCE;
+        subtract_at::<F, S>(i, above, path, &mut segment, x_above);
     }
     ancestors!(length, subtract(above, path, &mut segment, x_above));
 }
@@ -109,6 +123,15 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
     /// From the rows' scalars and the count of their ancestors.
     #[inline(always)]
     pub fn new(entries: &'a mut [F], length: usize, x: &mut [F]) -> Self {
+        let (mut removed, l) = Removed::of_corner(entries, length, x);
+        removed.complete(&l, 0..length);
+        removed
+    }
+
+    /// The rows eliminated among themselves, but for their entries with ancestors. [`Removed::complete`] does these by the L that
+    /// is returned.
+    #[inline(always)]
+    pub fn of_corner(entries: &'a mut [F], length: usize, x: &mut [F]) -> (Self, [[F; S]; S]) {
         let mut rows = split::<F, S>(entries, length);
         // 1/D on the diagonal, L below it
         let mut l = [[F::c(0.0); S]; S];
@@ -136,10 +159,16 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
             rows[k][length..].copy_from_slice(&l[k][..k + 1]);
             rows[k] = &mut std::mem::take(&mut rows[k])[..length];
         }
-        for j in 0..length {
+        (Removed { rows, inverse, y }, l)
+    }
+
+    /// Eliminates the rows among themselves in some columns of their ancestors.
+    #[inline(always)]
+    pub fn complete(&mut self, l: &[[F; S]; S], columns: Range<usize>) {
+        for j in columns {
             let mut column = [F::c(0.0); S];
             for k in 0..S {
-                column[k] = rows[k][j];
+                column[k] = self.rows[k][j];
             }
             for k in (1..S).rev() {
                 for i in 0..k {
@@ -147,40 +176,98 @@ impl<'a, F: Num, const S: usize> Removed<'a, F, S> {
                 }
             }
             for k in 0..S - 1 {
-                rows[k][j] = column[k];
+                self.rows[k][j] = column[k];
             }
         }
-        Removed { rows, inverse, y }
     }
 
-    /// Subtracts the rows from an ancestor's row, and from its part of the right-hand side.
+    /// What of each row is subtracted from the T ancestors that follow `first`.
     #[inline(always)]
-    pub fn subtract_from(&mut self, target: &mut [F], x: &mut F) {
-        let (rows, last) = (&mut self.rows, target.len() - 1);
-        let mut share = self.inverse;
-        for k in 0..S {
-            share[k] = rows[k][last] * share[k];
-        }
-        // of one length, so that the loop has no check
-        let mut leading: [&[F]; S] = [&[]; S];
-        for k in 0..S {
-            leading[k] = &rows[k][..target.len()];
-        }
-        for j in 0..target.len() {
-            let mut entry = target[j];
-            for k in (0..S).rev() {
-                entry = share[k].fnma(leading[k][j], entry);
+    fn shares<const T: usize>(&self, first: usize) -> [[F; S]; T] {
+        let mut shares = [[F::c(0.0); S]; T];
+        for t in 0..T {
+            for k in 0..S {
+                shares[t][k] = self.rows[k][first + t] * self.inverse[k];
             }
-            target[j] = entry;
         }
-        for k in (0..S).rev() {
-            *x = self.y[k].fnma(share[k], *x);
-            rows[k][last] = share[k];
+        shares
+    }
+
+    /// Subtracts the rows from those of the T ancestors that follow `first`, which have the entries of `columns` and their own;
+    /// and from their parts of the right-hand side, which are at `places` of `x`.
+    #[inline(always)]
+    pub fn subtract_from<const T: usize>(
+        &mut self,
+        first: usize,
+        columns: impl Iterator<Item = Range<usize>>,
+        mut targets: [&mut [F]; T],
+        x: &mut [F],
+        places: [usize; T],
+    ) {
+        let shares = self.shares::<T>(first);
+        for columns in columns {
+            self.subtract_columns(&shares, &mut targets, columns);
+        }
+        // columns that not all of the ancestors have
+        for t in 0..T {
+            for j in first..first + t + 1 {
+                let mut entry = targets[t][j];
+                for k in (0..S).rev() {
+                    entry = shares[t][k].fnma(self.rows[k][j], entry);
+                }
+                targets[t][j] = entry;
+            }
+            let mut xi = x[places[t]];
+            for k in (0..S).rev() {
+                xi = self.y[k].fnma(shares[t][k], xi);
+            }
+            x[places[t]] = xi;
+        }
+        for t in 0..T {
+            for k in 0..S {
+                self.rows[k][first + t] = shares[t][k];
+            }
+        }
+    }
+
+    /// Subtracts in columns that all of the ancestors have: a scalar of them is loaded and stored once for S rows, one of the rows
+    /// loaded once for T ancestors.
+    #[inline(always)]
+    fn subtract_columns<const T: usize>(
+        &self,
+        shares: &[[F; S]; T],
+        targets: &mut [&mut [F]; T],
+        columns: Range<usize>,
+    ) {
+        // of one length, so that the loop has no check
+        let length = columns.len();
+        let mut rows: [&[F]; S] = [&[]; S];
+        for k in 0..S {
+            rows[k] = &self.rows[k][columns.clone()][..length];
+        }
+        let mut cells = [(); T].map(|()| <&mut [F]>::default());
+        for (cells, target) in cells.iter_mut().zip(targets) {
+            *cells = &mut target[columns.clone()][..length];
+        }
+        for j in 0..length {
+            let mut entries = [F::c(0.0); T];
+            for t in 0..T {
+                entries[t] = cells[t][j];
+            }
+            for k in (0..S).rev() {
+                let x = rows[k][j];
+                for t in 0..T {
+                    entries[t] = shares[t][k].fnma(x, entries[t]);
+                }
+            }
+            for t in 0..T {
+                cells[t][j] = entries[t];
+            }
         }
     }
 }
 
-/// The row of ancestor I less its share of S rows.
+/// The rows of the [`AT_ONCE`] ancestors from I on less their shares of S rows.
 #[inline(always)]
 fn subtract<F: Num, const S: usize, const I: usize>(
     above: &mut [F],
@@ -188,14 +275,42 @@ fn subtract<F: Num, const S: usize, const I: usize>(
     segment: &mut Removed<'_, F, S>,
     x_above: &mut [F],
 ) {
-    let target = &mut above[path.starts[I]..path.starts[I] + I + 1];
-    segment.subtract_from(target, &mut x_above[path.rows[I]]);
+    subtract_at::<F, S>(I, above, path, segment, x_above);
+}
+
+/// [`subtract`] of a place that is known at run time.
+#[inline(always)]
+fn subtract_at<F: Num, const S: usize>(
+    i: usize,
+    above: &mut [F],
+    path: &Path<'_>,
+    segment: &mut Removed<'_, F, S>,
+    x_above: &mut [F],
+) {
+    // starts rise along a path, and its rows do not overlap
+    let &[a, b, c] = &path.starts[i..i + AT_ONCE] else {
+        unreachable!("{AT_ONCE} ancestors")
+    };
+    let (rest, third) = above.split_at_mut(c);
+    let (rest, second) = rest.split_at_mut(b);
+    let targets = [
+        &mut rest[a..a + i + 1],
+        &mut second[..i + 2],
+        &mut third[..i + 3],
+    ];
+    let &[a, b, c] = &path.rows[i..i + AT_ONCE] else {
+        unreachable!("{AT_ONCE} ancestors")
+    };
+    segment.subtract_from(i, std::iter::once(0..i), targets, x_above, [a, b, c]);
 }
 
 /// The rows of a segment of `path` ancestors, to read: their entries with the ancestors, all of one length, and those among
 /// themselves.
 #[inline(always)]
-fn split_ref<F: Num, const S: usize>(mut entries: &[F], path: usize) -> ([&[F]; S], [[F; S]; S]) {
+pub(super) fn split_ref<F: Num, const S: usize>(
+    mut entries: &[F],
+    path: usize,
+) -> ([&[F]; S], [[F; S]; S]) {
     let mut rows = [&entries[..0]; S];
     let mut corner = [[F::c(0.0); S]; S];
     for k in 0..S {
