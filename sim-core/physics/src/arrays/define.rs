@@ -65,6 +65,8 @@ macro_rules! arrays {
             $(#[doc = concat!("`[", stringify!($vlen), "]` [", $vunit, "]")] pub $v: Vec<element::$velement<F>>,)*
             /// What the stages leave for each other.
             pub work: Workspace<F>,
+            /// Which part of its work a stage does that may pause.
+            pub pause: Pause,
         }
 
         /// Results and scratch of the stages.
@@ -83,6 +85,7 @@ macro_rules! arrays {
                     work: Workspace {
                         $($w: vec![<element::$welement<F> as Element<F>>::zero(); $wlen],)*
                     },
+                    pause: Pause::default(),
                 };
                 for (param, (_, start)) in block.params.iter_mut().zip($m.varying.starts()) {
                     *param = F::c(*start);

@@ -210,7 +210,7 @@ pub(super) const FORCE: Command = command(Keeper::Drive, Takes::Reals, true);
 pub(super) const TARGET: Command = command(Keeper::Drive, Takes::Targets, false);
 pub(super) const RATE: Command = command(Keeper::Drive, Takes::Targets, true);
 pub(super) const CONTROL: Command = command(Keeper::State, Takes::Reals, true);
-pub(super) const PLACE: Command = command(Keeper::State, Takes::Reals, false);
+pub(super) const POSE: Command = command(Keeper::State, Takes::Reals, false);
 pub(super) const SWITCH: Command = command(Keeper::State, Takes::Switches, false);
 
 pub(super) const REAL: FieldDtype = FieldDtype::Real;

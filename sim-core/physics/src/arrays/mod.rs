@@ -4,6 +4,7 @@ mod define;
 mod element;
 mod fields;
 mod layout;
+mod pause;
 pub mod status;
 mod table;
 
@@ -11,4 +12,5 @@ pub use crate::constants::Sizes;
 pub use define::Flat;
 pub use fields::{Axis, Command, Dtype, FieldDtype, FieldRow, Group, Keeper, Takes};
 pub use layout::{Layout, Slot};
+pub use pause::Pause;
 pub use table::{Array, Block, Field, Source, Workspace, Writer};

@@ -12,9 +12,10 @@
 use super::define::{Flat, arrays};
 use super::element::{self, Element};
 use super::fields::{
-    Axis, CONTROL, F64, FORCE, FieldDtype, FieldRow, Group, I32, PLACE, RATE, REAL, SWITCH, TARGET,
+    Axis, CONTROL, F64, FORCE, FieldDtype, FieldRow, Group, I32, POSE, RATE, REAL, SWITCH, TARGET,
     U32, U64,
 };
+use super::pause::Pause;
 use crate::constants::Constants;
 use crate::constants::options::Integrator;
 use crate::lane::{Num, Real};
@@ -85,6 +86,8 @@ arrays! { m;
         // iterations of the solver, line searches and their evaluations so far, for a profile: of each world, and of the block
         solver_work: SolverWork [3] Scratch "–";
         solver_block_work: SolverBlockWork [3] Scratch "–";
+        // of a solve that pauses: `Progress` of the solver
+        solver_progress: SolverProgress [5] Scratch "–";
         // 1 where the solver has not ended, at the first dof of an island
         busy: Busy [m.island_dofs()] Scratch "–";
         // contacts that a sensor shows
@@ -102,9 +105,9 @@ arrays! { m;
         ctrl: Ctrl [Scalar; m.actuators.all.len()] Command "–"
             => "ctrl" CONTROL [Actuators], "Controls of the actuators, as MuJoCo's `ctrl`, before they are clamped to their ranges.";
         mocap_pos: MocapPos [Scalar; 3 * m.mocaps] Command "m"
-            => "mocap_pos" PLACE [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
+            => "mocap_pos" POSE [Mocaps, Size(3)], "Where the mocap bodies of MuJoCo models are, in the world.";
         mocap_quat: MocapQuat [Scalar; 4 * m.mocaps] Command "–"
-            => "mocap_quat" PLACE [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
+            => "mocap_quat" POSE [Mocaps, Size(4)], "How they are turned: quaternions (w, x, y, z) of any length.";
         eq_active: EqActive [Scalar; m.switches] Command "–"
             => "eq_active" SWITCH [Equalities], "1 where an equality of a MuJoCo model acts, 0 where it does not.";
         // commands of the frames before, the last one first, each as joint_f, joint_target_q, joint_target_qd

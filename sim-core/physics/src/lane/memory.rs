@@ -367,6 +367,10 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         F::any(self.mask & mask)
     }
     #[inline(always)]
+    fn are_few(&mut self, few: usize) -> bool {
+        F::bits(self.mask).count_ones() as usize <= few
+    }
+    #[inline(always)]
     fn leave(&mut self, block: F::Mask) {
         self.mask = block;
     }

@@ -222,6 +222,8 @@ pub trait Lane: Num + Default + Send + Sync + 'static {
     fn scatter(self, mask: Self::Mask, to: &mut [Self], rows: Self, stride: usize);
     /// Reads one scalar for every world, at `places`: whole, and inside `from`.
     fn gather(from: &[Self::Real], places: Self) -> Self;
+    /// In the lanes of `to`, lane k of each target becomes lane `from[k]` of its source; `from` is below `WIDTH`.
+    fn take_lanes(targets: &mut [Self], sources: &[Self], from: &[u32], to: Self::Mask);
 }
 
 /// The execution context: variables, scratch rows, and control flow with a mask of active worlds.
@@ -463,6 +465,11 @@ pub trait Cx: Sized {
     #[inline(always)]
     fn anywhere(&mut self, _mask: MaskOf<Self>) -> bool {
         true
+    }
+    /// Are no more than `few` worlds active? False on a backend that cannot know; results are the same either way.
+    #[inline(always)]
+    fn are_few(&mut self, _few: usize) -> bool {
+        false
     }
     /// Closes a block.
     fn leave(&mut self, block: Self::Block);

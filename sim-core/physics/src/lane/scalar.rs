@@ -94,6 +94,12 @@ macro_rules! scalar {
             fn gather(from: &[$real], places: Self) -> Self {
                 from[places as usize]
             }
+            #[inline(always)]
+            fn take_lanes(targets: &mut [Self], sources: &[Self], _from: &[u32], to: bool) {
+                if to {
+                    targets.copy_from_slice(sources);
+                }
+            }
         }
     };
 }

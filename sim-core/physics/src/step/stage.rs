@@ -18,6 +18,9 @@ pub trait Stage {
     /// Arrays for whose sake an evaluation runs it.
     const COMPLETES: &'static [Array] = Self::WRITES;
 
+    /// Arrays from which it goes on where it paused, see [`crate::arrays::Pause`]; none for a stage that never does.
+    const RESUMES: &'static [Array] = &[];
+
     /// Has the model anything for it to do?
     fn is_needed<R: Real>(_m: &Constants<R>) -> bool {
         true
@@ -65,6 +68,8 @@ pub struct StageRow {
     pub writes: &'static [Array],
     /// [`Stage::COMPLETES`]
     pub completes: &'static [Array],
+    /// [`Stage::RESUMES`]
+    pub resumes: &'static [Array],
     /// What runs it.
     pub runs: Runs,
 }
@@ -83,6 +88,7 @@ macro_rules! stage_rows {
             reads: <$crate::step::$($page)* as $crate::step::Stage>::READS,
             writes: <$crate::step::$($page)* as $crate::step::Stage>::WRITES,
             completes: <$crate::step::$($page)* as $crate::step::Stage>::COMPLETES,
+            resumes: <$crate::step::$($page)* as $crate::step::Stage>::RESUMES,
             runs: $crate::step::Runs::$runs,
         }),*]
     };
@@ -136,6 +142,11 @@ impl StageId {
     /// [`StageRow::writes`]
     pub fn writes(self) -> &'static [Array] {
         self.row().writes
+    }
+
+    /// [`StageRow::resumes`]
+    pub fn resumes(self) -> &'static [Array] {
+        self.row().resumes
     }
 
     /// Its place in the list, and in tables of its compiled functions.

@@ -227,6 +227,18 @@ impl Lane for F32x8 {
         }
         Self::load(&lanes)
     }
+    #[inline(always)]
+    fn take_lanes(targets: &mut [Self], sources: &[Self], from: &[u32], to: Mask8) {
+        for (target, source) in targets.iter_mut().zip(sources) {
+            let mut lanes = [0.0; 8];
+            source.store(&mut lanes);
+            let mut taken = [0.0; 8];
+            for (taken, &lane) in taken.iter_mut().zip(from) {
+                *taken = lanes[lane as usize & 7];
+            }
+            *target = Self::select(to, Self::load(&taken), *target);
+        }
+    }
 }
 
 /// From scalars by world to worlds by scalar.

@@ -17,7 +17,7 @@ macro_rules! register {
      arithmetic [$add:ident $sub:ident $mul:ident $div:ident $fma:ident $fnma:ident $sqrt:ident $min:ident $max:ident],
      memory [$splat:ident $load:ident $store:ident $transpose:ident $block:ident],
      bits [$neg:ident $abs:ident $round:ident $lt:ident $select:ident],
-     masks [$any:ident $all:ident $mask_bits:ident], places [$gather:ident $scatter:ident]) => {
+     masks [$any:ident $all:ident $mask_bits:ident], places [$gather:ident $scatter:ident $indices:ident $permute:ident]) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -170,6 +170,15 @@ macro_rules! register {
                 let places = places.max(Self::k(0.0)).min(Self::k(last));
                 Self(unsafe { $gather(from, places.0) })
             }
+            #[inline(always)]
+            fn take_lanes(targets: &mut [Self], sources: &[Self], from: &[u32], to: $mask) {
+                assert!(from.len() >= $width);
+                // the slice holds a register of indices (asserted), of which a permutation takes the lowest bits
+                let from = unsafe { $indices(from.as_ptr().cast()) };
+                for (target, source) in targets.iter_mut().zip(sources) {
+                    target.0 = unsafe { $permute(target.0, to, from, source.0) };
+                }
+            }
         }
     };
 }
@@ -181,7 +190,7 @@ register!(
         _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps],
     memory [_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps transpose8 block8],
     bits [neg8 abs8 round8 lt8 select8],
-    masks [any8 all8 bits8], places [gather8 scatter8]
+    masks [any8 all8 bits8], places [gather8 scatter8 _mm256_loadu_si256 permute8]
 );
 
 register!(
@@ -191,7 +200,7 @@ register!(
         _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps],
     memory [_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps transpose16 block16],
     bits [neg16 _mm512_abs_ps round16 lt16 select16],
-    masks [any16 all16 bits16], places [gather16 scatter16]
+    masks [any16 all16 bits16], places [gather16 scatter16 _mm512_loadu_si512 _mm512_mask_permutexvar_ps]
 );
 
 /// Booleans of eight worlds: all bits of a lane, or none. AVX-512 has registers for masks, which are `u16` in Rust.
@@ -257,6 +266,12 @@ unsafe fn bits8(a: Mask8) -> u32 {
 #[inline(always)]
 unsafe fn gather8(from: &[f32], places: __m256) -> __m256 {
     unsafe { _mm256_i32gather_ps::<4>(from.as_ptr(), _mm256_cvtps_epi32(places)) }
+}
+
+/// To each lane of the mask the scalar of the lane that its index names.
+#[inline(always)]
+unsafe fn permute8(target: __m256, to: Mask8, from: __m256i, x: __m256) -> __m256 {
+    unsafe { select8(to, _mm256_permutevar8x32_ps(x, from), target) }
 }
 
 /// Writes the scalar of each world w of the mask to `to[rows * stride + w]`, where `rows` are whole.

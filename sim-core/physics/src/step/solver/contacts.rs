@@ -189,6 +189,22 @@ pub(super) fn residual<C: Cx, const TURNS: bool>(
     }
 }
 
+/// Sets the residuals of all contacts to those ahead, where the step was taken as a whole.
+#[inline(always)]
+pub(super) fn step_ahead<C: Cx, const TURNS: bool>(cx: &mut C, t: &ContactsOf<C>) {
+    for (k, class) in t.classes.iter().enumerate() {
+        let list = class_list(cx, t, k);
+        each!(cx, r in list, {
+            let jar = cx.load3(t.memory.rows, r, row::AHEAD);
+            cx.fill_all(t.memory.rows, r, row::JAR, jar);
+            if let Some(block) = block_of::<_, TURNS>(class) {
+                let jar = cx.load3(t.memory.rows, r, block + more::AHEAD);
+                cx.fill_all(t.memory.rows, r, block + more::JAR, jar);
+            }
+        });
+    }
+}
+
 /// Place in the second block of what is at a place of the first.
 fn second(place: usize) -> usize {
     match place {

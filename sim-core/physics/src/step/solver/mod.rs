@@ -36,6 +36,12 @@
 //!
 //! Where the mass matrix loses too many digits in `f32`, [`refine`] corrects the accelerations by inverse dynamics.
 //!
+//! # Pauses
+//!
+//! On the CPU a block pauses when few of its worlds go on ([`crate::arrays::Pause`]). What an iteration leaves to the next is
+//! saved ([`Progress`]), with a world's part of the arrays in [`Stage::RESUMES`] and its contacts. A block of worlds from
+//! several others resumes; the forces follow in a world's own block. So an iteration may keep nothing else.
+//!
 //! # What is skipped
 //!
 //! Where limits and contacts are the only rows and none acts in a block, `f32` skips the solver: the integrator factors a
@@ -59,7 +65,7 @@
 //! | `newton`, `bracket`, `contact_line`, `islands` | MuJoCo's iterations and line search, for its models in `f64` |
 //! | `own_rows` | its rows of joints, where several lanes share a world |
 //! | `hold` | contacts that slide, and are assumed to stick |
-//! | `progress` | which worlds search, and which have arrived |
+//! | `progress` | which worlds search, which have arrived, and what a pause saves |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
 
 mod assembly;
@@ -127,6 +133,19 @@ impl<const TURNS: bool> Stage for Solver<TURNS> {
         A::ContactForces,
     ];
 
+    const RESUMES: &'static [A] = &[
+        A::JointQdd,
+        A::Params,
+        A::MassMatrix,
+        A::SmoothForce,
+        A::EfcD,
+        A::EfcAref,
+        A::LimitSide,
+        A::RowJacobian,
+        A::SolverProgress,
+        A::SolverWork,
+    ];
+
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
         let mut classes = m.contacts.classes.iter();
         (R::DOUBLE || classes.any(|class| class.turns.is_some())) == TURNS
@@ -178,15 +197,25 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
         _ => None,
     };
     let spread = spread.as_ref();
-    let mut progress = Progress::new(cx, acts, corrects);
+    let pause = b.pause;
+    let mut progress = match pause.resumes {
+        false => Progress::new(cx, acts, corrects),
+        true => Progress::load(cx, &b.solver_progress),
+    };
+    // whether the rows at a are those at the last a⁺
+    let mut rows_known = false;
     // Newton's iterations, until each world has arrived or has none left
     times!(cx, m.solver.iterations, {
         if may_idle::<C>(m) {
             break_if!(cx, !acts);
         }
+        if pause.resumes {
+            let goes_on = progress.goes_on(cx, m);
+            break_if!(cx, !goes_on);
+        }
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
         // the cost at a: residuals of the rows, H = M + Jᵀ W J and the right-hand side
-        model_cost::<C, TURNS>(cx, m, b, acting, corrects, spread);
+        model_cost::<C, TURNS>(cx, m, b, acting, corrects, spread, rows_known);
         // its minimum a⁺, what bodies that touch gain by going there, and how much stiffer than M it is
         let hold = progress.hold(cx, m);
         let gain = minimize_model::<C, TURNS>(cx, m, b, corrects, coupling, spread, hold);
@@ -199,10 +228,23 @@ fn solve<C: Cx, const TURNS: bool>(cx: &mut C, m: &ConstantsOf<C>, b: &mut Block
             search_segment::<C, TURNS>(cx, m, b, &mut progress, &plan, acting, corrects, spread);
         // the next a, and the worlds that have arrived
         advance(cx, b, &plan, &result);
+        rows_known = !cx.anywhere(plan.searches);
         let done = progress.note(cx, &plan, &result, corrects);
         break_if!(cx, done);
         progress.count(cx);
+        // so few worlds go on with others, elsewhere
+        if pause.few > 0 && cx.are_few(pause.few) {
+            break_if!(cx, C::F::c(0.0).lt(C::F::c(1.0)));
+        }
     });
+    if pause.few > 0 || pause.iterates {
+        let goes_on = progress.goes_on(cx, m);
+        if pause.iterates || cx.anywhere(goes_on) {
+            progress.save(cx, &mut b.solver_progress);
+            b.pause.paused = true;
+            return;
+        }
+    }
     // worlds that are still busy used up their iterations
     progress.report(cx, b);
 
@@ -229,6 +271,7 @@ fn model_cost<C: Cx, const TURNS: bool>(
     acting: Acting,
     corrects: Option<MaskOf<C>>,
     spread: Option<&Spread<C::F>>,
+    rows_known: bool,
 ) {
     let w = &mut b.work;
     // a, and τ on the right-hand side, whose place the solution takes
@@ -253,16 +296,22 @@ fn model_cost<C: Cx, const TURNS: bool>(
         Some(_) => w.hessian.fill(C::F::c(0.0)),
     }
     // jar of joint rows and ties; then Jᵀ W J in H, and their pull on the right-hand side
-    residual(
-        m,
-        Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
-        &w.row_aref,
-        &w.start,
-        &mut w.jar,
-    );
+    if rows_known {
+        w.jar.copy_from_slice(&w.jar_minimum);
+    } else {
+        residual(
+            m,
+            Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
+            &w.row_aref,
+            &w.start,
+            &mut w.jar,
+        );
+    }
     assemble(m, &b.params, w, acting, corrects);
     // contacts have jar alone here: their Jᵀ W J is assembled when the system is solved
-    if corrects.is_some() {
+    if corrects.is_some() && rows_known {
+        contacts::step_ahead::<_, TURNS>(cx, &m.contacts);
+    } else if corrects.is_some() {
         contacts::residual::<_, TURNS>(cx, &m.contacts, &w.start, row::JAR);
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn solve<C: Cx, const TURNS: bool>(
         cx.tally(&mut b.solver_work[0], &mut b.solver_block_work[0]);
         // Jᵀ f at a, then the quadratic model and its minimum a⁺
         constraint_forces::<C, TURNS>(cx, m, b, problem.acting);
-        model_cost::<C, TURNS>(cx, m, b, problem.acting, problem.corrects, None);
+        model_cost::<C, TURNS>(cx, m, b, problem.acting, problem.corrects, None, false);
         minimize_model::<C, TURNS>(cx, m, b, problem.corrects, problem.coupling, None, None);
         let w = &mut b.work;
         // M a - τ, the gradient g = M a - τ - Jᵀ f, and s = a⁺ - a

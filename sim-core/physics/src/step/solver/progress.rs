@@ -4,6 +4,7 @@ use super::hold::Hold;
 use super::line::Line;
 use super::rows::{Acting, Jacobian, changes, residual};
 use super::{UNKNOWN, contacts};
+use crate::arrays::Pause;
 use crate::constants::contact::{Cone, row};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::step::{BlockOf, ConstantsOf};
@@ -130,6 +131,46 @@ impl<C: Cx> Progress<C> {
             last_gain: cx.var(C::F::c(2.0 * UNKNOWN)),
             searched: cx.var(zero),
         }
+    }
+
+    /// As it was saved, where a solve goes on.
+    #[inline(always)]
+    pub fn load(cx: &mut C, saved: &[C::V]) -> Progress<C> {
+        let mut part = |k: usize| {
+            let value = cx.get(&saved[k]);
+            cx.var(value)
+        };
+        Progress {
+            calm: part(0),
+            busy: part(Pause::BUSY),
+            iteration: part(Pause::ITERATION),
+            last_gain: part(3),
+            searched: part(4),
+        }
+    }
+
+    /// Saves it, where a solve pauses: in the order of the fields, see [`Pause::BUSY`].
+    #[inline(always)]
+    pub fn save(&self, cx: &mut C, saved: &mut [C::V]) {
+        let parts = [
+            &self.calm,
+            &self.busy,
+            &self.iteration,
+            &self.last_gain,
+            &self.searched,
+        ];
+        for (cell, part) in saved.iter_mut().zip(parts) {
+            let value = cx.get(part);
+            cx.put(cell, value);
+        }
+    }
+
+    /// The worlds that have neither arrived nor used up their iterations.
+    #[inline(always)]
+    pub fn goes_on(&self, cx: &mut C, m: &ConstantsOf<C>) -> MaskOf<C> {
+        let half = C::F::c(0.5);
+        let end = C::F::c(m.solver.iterations as f64 - 0.5);
+        half.lt(cx.get(&self.busy)) & cx.get(&self.iteration).lt(end)
     }
 
     /// Which contacts the next model holds: none in the last iteration, whose step may not be taken then.
