@@ -1,10 +1,10 @@
 //! Lane assignment: which lane of which block holds a world.
 //!
-//! A block takes as long as its slowest world, and visits every contact that any of its worlds has. So worlds of the same kind
+//! A block iterates until few of its worlds are left, and visits every contact that any of its worlds has. So worlds of the same kind
 //! (`contact_kinds`) share a block: after each frame a chunk sorts its worlds by the contacts of the last substep (`regroup`).
 //! No value of a world depends on its lane or its neighbours.
 
-use super::contact_kinds::{KINDS, Kind};
+use super::contact_kinds::Kind;
 use std::ops::Range;
 
 /// Lanes of a chunk, counted from its first block.
@@ -17,6 +17,12 @@ pub(super) struct LaneAssignment {
     kinds: Vec<Kind>,
     /// Whether the kind of a world changed since the last assignment.
     changed: bool,
+    /// Scratch: the kinds that worlds have, in order.
+    distinct: Vec<Kind>,
+    /// Scratch: the place there of the kind of each world.
+    places: Vec<usize>,
+    /// Scratch: for each of them, its lanes that are still to be examined.
+    ranges: Vec<Range<usize>>,
 }
 
 impl LaneAssignment {
@@ -27,6 +33,9 @@ impl LaneAssignment {
             world: (0..lanes).collect(),
             kinds: vec![0; worlds],
             changed: false,
+            distinct: Vec::with_capacity(worlds),
+            places: vec![0; worlds],
+            ranges: Vec::with_capacity(worlds),
         }
     }
 
@@ -70,31 +79,34 @@ impl LaneAssignment {
         if !std::mem::take(&mut self.changed) {
             return;
         }
-        let mut ends = [0_usize; KINDS];
-        for &kind in &self.kinds {
-            ends[usize::from(kind)] += 1;
+        self.distinct.clear();
+        self.distinct.extend_from_slice(&self.kinds);
+        self.distinct.sort_unstable();
+        self.ranges.clear();
+        for (lane, kind) in self.distinct.iter().enumerate() {
+            match self.ranges.last_mut() {
+                Some(range) if self.distinct[range.start] == *kind => range.end = lane + 1,
+                _ => self.ranges.push(lane..lane + 1),
+            }
         }
-        // the next lane of each kind to examine
-        let mut next = [0; KINDS];
-        let mut lanes = 0;
-        for (next, end) in next.iter_mut().zip(&mut ends) {
-            *next = lanes;
-            lanes += *end;
-            *end = lanes;
+        self.distinct.dedup();
+        for (place, kind) in self.places.iter_mut().zip(&self.kinds) {
+            let place_of_kind = self.distinct.binary_search(kind);
+            *place = place_of_kind.expect("it is one of them");
         }
-        for kind in 0..KINDS {
-            while next[kind] < ends[kind] {
-                let lane = next[kind];
-                let kind_here = usize::from(self.kinds[self.world[lane]]);
+        for kind in 0..self.ranges.len() {
+            while !self.ranges[kind].is_empty() {
+                let lane = self.ranges[kind].start;
+                let kind_here = self.places[self.world[lane]];
                 if kind_here == kind {
-                    next[kind] += 1;
+                    self.ranges[kind].start += 1;
                     continue;
                 }
                 // there is one, since each kind has as many lanes as worlds
-                while usize::from(self.kinds[self.world[next[kind_here]]]) == kind_here {
-                    next[kind_here] += 1;
+                while self.places[self.world[self.ranges[kind_here].start]] == kind_here {
+                    self.ranges[kind_here].start += 1;
                 }
-                let other = next[kind_here];
+                let other = self.ranges[kind_here].start;
                 self.world.swap(lane, other);
                 self.lane[self.world[lane]] = lane;
                 self.lane[self.world[other]] = other;

@@ -1,7 +1,7 @@
 //! Moves worlds between lanes, so that those with the same contacts share a block.
 
 use super::chunk::{Chunk, Job};
-use super::contact_kinds::{Bit, ContactKinds, Kind};
+use super::contact_kinds::{Bit, COUPLED, ContactKinds, Kind};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Lane;
 
@@ -29,9 +29,20 @@ impl<F: Lane> Chunk<F> {
         let mut kinds: [Kind; 64] = [0; 64];
         for (of, bit) in self.kinds.bits() {
             let worlds = set(*of);
+            if worlds == 0 {
+                continue;
+            }
             for (lane, kind) in kinds[..F::WIDTH].iter_mut().enumerate() {
                 *kind |= (worlds >> lane & 1) as Kind * bit;
             }
+        }
+        let classes = m.contacts.classes.iter().enumerate();
+        let coupled = classes.filter(|(_, class)| class.couples);
+        let coupled = coupled.fold(0, |worlds, (class, _)| {
+            worlds | set(Bit { class, level: 0 })
+        });
+        for (lane, kind) in kinds[..F::WIDTH].iter_mut().enumerate() {
+            *kind |= (coupled >> lane & 1) as Kind * COUPLED;
         }
         for lane in lanes {
             let world = self.assignment.world(lane);
@@ -44,7 +55,7 @@ impl<F: Lane> Chunk<F> {
         if ContactKinds::is_due(self.frames) {
             let classes = &job.constants.contacts.classes;
             self.kinds
-                .choose(|class| classes[class].columns.len().pow(2));
+                .choose(F::WIDTH, |class| classes[class].columns.len().pow(2));
         }
         let numbers = job.shape.total();
         let place = |lane: usize| (lane / F::WIDTH) * numbers * F::WIDTH + lane % F::WIDTH;
