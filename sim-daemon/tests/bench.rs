@@ -58,7 +58,16 @@ fn a_standing_box_has_four_contacts_and_a_solver() {
     assert_eq!(report["faulted"], 0);
     let mean = |count: &str| report["counts"][count]["mean"].as_f64().unwrap();
     assert_eq!((mean("contacts"), mean("rows")), (4.0, 12.0));
+    // two blocks, which do not pause
     assert!(mean("iterations") >= 1.0 && mean("block_iterations") >= mean("iterations"));
+    assert_eq!(report["moves"], 0.0);
+    let lanes = |work: &str, number: &str| report["lanes"][work][number].as_f64().unwrap();
+    for work in ["contacts", "iterations"] {
+        assert!(lanes(work, "executed") >= lanes(work, "needed") && lanes(work, "needed") > 0.0);
+    }
+    for part in ["load", "store", "fields", "grouping", "gathering"] {
+        assert!(report["parts_ns"][part].as_f64().unwrap() >= 0.0, "{part}");
+    }
     let stages = report["stages"].as_array().unwrap();
     let time = |name: &str| {
         let stage = stages.iter().find(|stage| stage["stage"] == name);

@@ -135,6 +135,9 @@ pub const ORDER: &[(&str, &[&str])] = &[
         &[
             "contact_kinds",
             "lane_assignment",
+            "space",
+            "lane_move",
+            "gathered",
             "chunk",
             "delay",
             "faults",
@@ -145,6 +148,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "transfer",
             "contacts",
             "probe",
+            "gathering",
             "run",
             "backend",
             "dispatch",

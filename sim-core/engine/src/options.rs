@@ -267,11 +267,15 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
         Precision::F64 => (8, 1),
     };
     let worlds = (options.worlds as u64).saturating_add(width);
-    // scratch of each chunk, its matrices included; see backend/cpu/mod.rs
+    // scratch of each chunk, its matrices included, for every block that it keeps at hand; see backend/cpu/gathered.rs
     let m = model.constants();
     let matrices = 3 * m.pattern.len() + 2 * m.coupled.pattern.len();
     let chunks = threads_of(options).saturating_mul(cpu::CHUNKS_PER_THREAD) as u64;
-    let scratch = ((m.contacts.memory.len + matrices) as u64 * real * width)
+    let spaces = match width {
+        1 => 1,
+        _ => cpu::spaces_max(m, (real * width) as usize) as u64,
+    };
+    let scratch = ((m.contacts.memory.len + matrices) as u64 * real * width * spaces)
         .saturating_mul(chunks.min(worlds));
     // state and commands of a world, its counters; see backend/cpu/chunk.rs
     worlds

@@ -1,8 +1,8 @@
 //! Many worlds of one model: reset, write, step, read.
 
 pub use crate::backend::{
-    Faults, FirstFrozen, Frozen, Histogram, Lanes, OutputsAt, Precision, Profile, ProgramInfo,
-    StageProfile,
+    Faults, FirstFrozen, Frozen, Histogram, LaneWork, Lanes, OutputsAt, Part, Precision, Profile,
+    ProgramInfo, StageProfile,
 };
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;

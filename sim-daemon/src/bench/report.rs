@@ -1,7 +1,7 @@
 //! What a benchmark prints.
 
 use serde_json::{Value, json};
-use sim_engine::simulation::Histogram;
+use sim_engine::simulation::{Histogram, LaneWork, Part};
 
 use super::Measured;
 use crate::error::DaemonError;
@@ -17,16 +17,28 @@ pub(super) fn print(measured: &Measured, as_json: bool) -> Result<(), DaemonErro
 }
 
 /// The histograms, with what they count.
-fn counts(measured: &Measured) -> [(&'static str, &Histogram); 7] {
+fn counts(measured: &Measured) -> [(&'static str, &Histogram); 8] {
     let p = &measured.profile;
     [
         ("contacts", &p.contacts),
         ("constraint rows", &p.rows),
         ("solver iterations", &p.iterations),
-        ("  of the slowest of a block", &p.block_iterations),
+        ("  of a block until it pauses", &p.block_iterations),
         ("line searches", &p.searches),
         ("line-search evaluations", &p.evaluations),
         ("  of a block", &p.block_evaluations),
+        ("lanes of a visited contact", &p.contact_lanes),
+    ]
+}
+
+/// What blocks did for their worlds, and what these needed.
+fn lane_work(measured: &Measured) -> [(&'static str, LaneWork); 4] {
+    let p = &measured.profile;
+    [
+        ("contacts, each iteration", p.lane_contacts),
+        ("iterations", p.lane_iterations),
+        ("line-search evaluations", p.lane_evaluations),
+        ("iterations, coupled", p.lane_couplings),
     ]
 }
 
@@ -63,12 +75,26 @@ fn text(measured: &Measured) -> String {
             lines.push(format!("{name:<28}{mean:>9.2}{most:>7}{all:>9}"));
         }
     }
+    let steps = p.world_steps.max(1) as f64;
+    lines.push(String::new());
+    lines.push(format!(
+        "{:<28}{:>9}{:>9}{:>7}",
+        "solver, a world and step", "executed", "needed", "share"
+    ));
+    for (name, work) in lane_work(measured) {
+        if let Some(share) = work.share() {
+            let [executed, needed] = [work.executed, work.needed].map(|n| n as f64 / steps);
+            let share = format!("{:.0} %", 100.0 * share);
+            lines.push(format!("{name:<28}{executed:>9.2}{needed:>9.2}{share:>7}"));
+        }
+    }
+    let moves = p.moves as f64 / steps;
+    lines.push(format!("{:<28}{moves:>9.2}", "moves between blocks"));
     lines.push(String::new());
     lines.push(format!(
         "{:<28}{:>9}{:>7}{:>9}",
         "stage, one thread", "ns", "share", "masked"
     ));
-    let steps = p.world_steps.max(1) as f64;
     let all = p.total_ns as f64 / steps;
     let mut others = all;
     let mut outputs = 0.0;
@@ -84,7 +110,13 @@ fn text(measured: &Measured) -> String {
         }
     }
     lines.push(row("outputs", outputs, all, ""));
-    lines.push(row("everything else", others - outputs, all, ""));
+    others -= outputs;
+    for (part, name) in Part::ALL {
+        let ns = p.parts[part as usize] as f64 / steps;
+        others -= ns;
+        lines.push(row(name, ns, all, ""));
+    }
+    lines.push(row("everything else", others, all, ""));
     lines.push(String::new());
     lines.join("\n")
 }
@@ -106,6 +138,19 @@ fn json_of(measured: &Measured) -> Value {
         })
     });
     let stages: Vec<Value> = stages.collect();
+    let work =
+        lane_work(measured)
+            .into_iter()
+            .zip(["contacts", "iterations", "evaluations", "couplings"]);
+    let work = work.map(|((_, work), name)| {
+        let [executed, needed] = [work.executed, work.needed].map(|n| n as f64 / steps);
+        let numbers = json!({"executed": executed, "needed": needed, "share": work.share()});
+        (name.to_owned(), numbers)
+    });
+    let parts = Part::ALL.map(|(part, name)| {
+        let ns = p.parts[part as usize] as f64 / steps;
+        (name.to_owned(), json!(ns))
+    });
     let counts = counts(measured).into_iter().zip([
         "contacts",
         "rows",
@@ -114,6 +159,7 @@ fn json_of(measured: &Measured) -> Value {
         "searches",
         "evaluations",
         "block_evaluations",
+        "contact_lanes",
     ]);
     let counts = counts
         .filter(|((_, of), _)| !of.is_empty())
@@ -131,7 +177,10 @@ fn json_of(measured: &Measured) -> Value {
         "faulted": measured.faulted,
         "unconverged": measured.unconverged,
         "counts": counts.collect::<serde_json::Map<_, _>>(),
+        "moves": p.moves as f64 / steps,
+        "lanes": work.collect::<serde_json::Map<_, _>>(),
         "total_ns": p.total_ns as f64 / steps,
+        "parts_ns": serde_json::Map::from_iter(parts),
         "stages": stages,
     })
 }

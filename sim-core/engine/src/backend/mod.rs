@@ -15,7 +15,7 @@ mod state;
 pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 pub use input::{Input, Values};
-pub use profile::{Histogram, Profile, StageProfile};
+pub use profile::{Histogram, LaneWork, Part, Profile, StageProfile};
 pub use sim_device::HostPages;
 
 use crate::random::Numbering;

@@ -70,6 +70,56 @@ impl StageProfile {
     }
 }
 
+/// Work of a kind, in lanes: what blocks did, and what their worlds needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LaneWork {
+    /// What worlds needed.
+    pub needed: u64,
+    /// What blocks did, in every lane that holds a world; of gathered blocks in every lane.
+    pub executed: u64,
+}
+
+impl LaneWork {
+    /// Adds work that some lanes needed and all did.
+    pub fn add(&mut self, needed: usize, executed: usize) {
+        self.needed += needed as u64;
+        self.executed += executed as u64;
+    }
+
+    /// The share that was needed [–]; none of no work.
+    pub fn share(&self) -> Option<f64> {
+        (self.executed > 0).then(|| self.needed as f64 / self.executed as f64)
+    }
+}
+
+/// What a chunk does between stages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// State and commands of a block into its workspace.
+    Load,
+    /// The state of a block out of its workspace, and its faults.
+    Store,
+    /// Fields of frames, and counters.
+    Fields,
+    /// Worlds that share a block, chosen and moved.
+    Grouping,
+    /// Worlds moved amid a solve, to where registers are full.
+    Gathering,
+}
+
+impl Part {
+    /// How many there are.
+    pub const COUNT: usize = 5;
+    /// All, with their names.
+    pub const ALL: [(Part, &'static str); Part::COUNT] = [
+        (Part::Load, "load"),
+        (Part::Store, "store"),
+        (Part::Fields, "fields"),
+        (Part::Grouping, "grouping"),
+        (Part::Gathering, "gathering"),
+    ];
+}
+
 /// What steps took and did, on one thread.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
@@ -77,6 +127,8 @@ pub struct Profile {
     pub stages: Vec<StageProfile>,
     /// Time of everything, outputs included, the clock's own not [ns].
     pub total_ns: u64,
+    /// Time between stages, by [`Part`] [ns].
+    pub parts: [u64; Part::COUNT],
     /// Steps of a world.
     pub world_steps: u64,
     /// Contacts of a world, in every step.
@@ -85,14 +137,26 @@ pub struct Profile {
     pub rows: Histogram,
     /// Iterations of the solver in a world, in every solve.
     pub iterations: Histogram,
-    /// Iterations of a block's slowest world.
+    /// Iterations of a block until it pauses; of its slowest world where it does not.
     pub block_iterations: Histogram,
     /// Line searches of a world, in every solve.
     pub searches: Histogram,
     /// Evaluations of these line searches.
     pub evaluations: Histogram,
-    /// Evaluations of a block: of each search, those of its slowest world.
+    /// Evaluations of a block until it pauses: of each search, those of its slowest world.
     pub block_evaluations: Histogram,
+    /// Lanes that have a contact which their block visits.
+    pub contact_lanes: Histogram,
+    /// Moves of worlds to another block amid a solve.
+    pub moves: u64,
+    /// Contacts that blocks visit, in every iteration.
+    pub lane_contacts: LaneWork,
+    /// Iterations of the solver.
+    pub lane_iterations: LaneWork,
+    /// Evaluations of line searches.
+    pub lane_evaluations: LaneWork,
+    /// Solves of the system in which contacts couple what the mass matrix does not.
+    pub lane_couplings: LaneWork,
 }
 
 impl Profile {

@@ -1,7 +1,9 @@
-//! A chunk: blocks of worlds that one thread works on, with their state in lane order and one workspace.
+//! A chunk: blocks of worlds that one thread works on, with their state in lane order and a workspace for each block of a cluster.
 
 use super::contact_kinds::ContactKinds;
+use super::gathered::{Gathering, cluster_size};
 use super::lane_assignment::LaneAssignment;
+use super::space::Space;
 use crate::backend::noise::Noise;
 use crate::backend::state::{self, RECORD, Shape};
 use crate::backend::{Faults, Frozen, OutputsAt, Values};
@@ -15,6 +17,15 @@ use sim_physics::lane::{Lane, Real};
 use sim_physics::schedule::{evaluation_stages, step_stages};
 use sim_physics::step::{Runs, StageId};
 use std::ops::Range;
+
+/// A stage that may pause.
+#[derive(Clone, Copy)]
+pub(super) struct Pauses {
+    /// Its place.
+    pub stage: usize,
+    /// The arrays from which it resumes.
+    pub resumes: &'static [Array],
+}
 
 /// Data that all chunks share.
 pub(super) struct Job<F: Lane> {
@@ -32,6 +43,8 @@ pub(super) struct Job<F: Lane> {
     pub evaluate_now: Vec<usize>,
     /// Stages that evaluate the other ones before the last stage of a step; none where all belong to the state in the frame.
     pub evaluate_last: Option<Vec<usize>>,
+    /// The stage that may pause, where there is one.
+    pub pauses: Option<Pauses>,
     /// Whether they detect contacts.
     pub finds_contacts: bool,
     /// Duration of a control frame [s].
@@ -72,9 +85,16 @@ impl<F: Lane> Job<F> {
             let stages = stages.filter(|stage| stage.row().runs == Runs::Evaluation);
             places(&stages.collect::<Vec<_>>())
         });
+        let step = step_stages(&constants);
+        let pauses = step.iter().find(|stage| !stage.resumes().is_empty());
+        let pauses = pauses.filter(|_| F::WIDTH > 1);
         Job {
             shape: Shape::from_constants(&constants),
-            step: places(&step_stages(&constants)),
+            pauses: pauses.map(|stage| Pauses {
+                stage: stage.index(),
+                resumes: stage.resumes(),
+            }),
+            step: places(&step),
             evaluate: places(&evaluation),
             evaluate_now,
             evaluate_last,
@@ -114,11 +134,18 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) frames: u64,
     /// Worlds that were frozen since the last report.
     pub(super) frozen: Frozen,
-    pub block: Block<F, F>,
+    /// The block at work.
+    pub block: Box<Block<F, F>>,
+    /// Its scratch memory of the execution context.
+    pub memory: Vec<F>,
+    /// Spaces of a cluster of blocks; none in the place of the one at work.
+    pub(super) spaces: Vec<Option<Space<F>>>,
+    /// The place of the block at work in its cluster.
+    pub(super) at_work: usize,
+    /// Blocks of worlds from the cluster; none where blocks are by themselves.
+    pub(super) gathering: Option<Gathering<F>>,
     /// Scratch: what an evaluation amid a step must leave as it was.
     pub(super) kept: Vec<F>,
-    /// Scratch memory of the execution context.
-    pub memory: Vec<F>,
     /// Scratch: one field of one block.
     pub staging: Vec<F>,
     /// Scratch: the same, per element.
@@ -136,6 +163,13 @@ impl<F: Lane> Chunk<F> {
             .iter()
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
+        let cluster = match job.pauses {
+            Some(_) => cluster_size(&job.constants, blocks, size_of::<F>()),
+            None => 1,
+        };
+        let Space { block, memory } = Space::new(&job.constants);
+        let mut spaces = vec![None];
+        spaces.extend((1..cluster).map(|_| Some(Space::new(&job.constants))));
         let mut chunk = Chunk {
             state: vec![F::Real::default(); blocks * job.shape.total() * F::WIDTH],
             steps: vec![0; worlds.len()],
@@ -145,9 +179,12 @@ impl<F: Lane> Chunk<F> {
             episodes: vec![0; worlds.len()],
             frames: 0,
             frozen: Frozen::default(),
-            block: Block::new(&job.constants, F::default()),
+            block,
+            memory,
+            spaces,
+            at_work: 0,
+            gathering: (cluster > 1).then(|| Gathering::new(&job.constants)),
             kept: vec![F::default(); job.constants.dofs.len()],
-            memory: vec![F::default(); job.constants.contacts.memory.len],
             staging: vec![F::default(); elements],
             lanes: vec![F::Real::default(); elements * F::WIDTH],
             rows: vec![F::Real::default(); elements * F::WIDTH],
@@ -244,6 +281,21 @@ impl<F: Lane> Chunk<F> {
                 }
             }
         }
+    }
+
+    /// Goes to work in a space of the cluster.
+    #[inline(always)]
+    pub(super) fn enter(&mut self, k: usize) {
+        if self.at_work == k {
+            return;
+        }
+        let next = self.spaces[k].take().expect("a space that is not at work");
+        let last = Space {
+            block: std::mem::replace(&mut self.block, next.block),
+            memory: std::mem::replace(&mut self.memory, next.memory),
+        };
+        self.spaces[self.at_work] = Some(last);
+        self.at_work = k;
     }
 
     /// The lanes of a block that hold a world.

@@ -1,6 +1,7 @@
 //! The CPU backend: blocks of worlds, one world per SIMD lane, spread over threads. Sole user of rayon.
 //!
-//! A control frame is one pass per block: all substeps run while the block's state is in cache. A frame allocates nothing, except for a
+//! A control frame is one pass per block: all substeps run while the block's state is in cache. Where blocks gather, it is one pass
+//! per cluster of blocks, whose slowest worlds share further blocks (`gathering`). A frame allocates nothing, except for a
 //! few words per chunk where groups share their threads.
 //!
 //! # Groups
@@ -19,14 +20,19 @@ mod contacts;
 mod delay;
 mod dispatch;
 mod faults;
+mod gathered;
+mod gathering;
 mod lane_assignment;
+mod lane_move;
 mod noise;
 mod probe;
 mod records;
 mod regroup;
 mod reset;
 mod run;
+mod space;
 mod transfer;
 
 pub(crate) use backend::CHUNKS_PER_THREAD;
 pub use dispatch::{available, create};
+pub(crate) use gathered::spaces_max;

@@ -1,6 +1,6 @@
 //! What may watch a chunk run: nothing, or a profile.
 
-use crate::backend::profile::Profile;
+use crate::backend::profile::{Part, Profile};
 use sim_physics::arrays::Block;
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{pair, row};
@@ -27,6 +27,10 @@ pub(super) trait Probe<F: Lane> {
     fn before(&mut self, _moment: Moment<'_, F>) {}
     /// After it.
     fn after(&mut self, _moment: Moment<'_, F>) {}
+    /// After a part of what happens between stages; it began where the last stage or part ended.
+    fn after_part(&mut self, _part: Part) {}
+    /// Worlds moved to a gathered block.
+    fn note_moves(&mut self, _worlds: usize) {}
 }
 
 impl<F: Lane> Probe<F> for () {}
@@ -39,6 +43,8 @@ pub(super) struct Watch<'a, F> {
     pub own_ns: u64,
     /// Contacts of each class before the stage.
     counts: Vec<F>,
+    /// Iterations of each world before the stage, where a solve goes on.
+    iterations: F,
     place: usize,
     contact_rows: usize,
     solver: [usize; 2],
@@ -52,6 +58,7 @@ impl<'a, F: Lane> Watch<'a, F> {
             begin: Instant::now(),
             own_ns: 0,
             counts: vec![F::c(0.0); m.contacts.classes.len()],
+            iterations: F::c(0.0),
             place: place("place"),
             contact_rows: place("contact_rows"),
             solver: ["solver", "solver_turning"].map(place),
@@ -96,34 +103,97 @@ impl<'a, F: Lane> Watch<'a, F> {
         }
     }
 
+    /// What the worlds of a block needed of the contacts and coupled systems that a call of its solver visited, in every iteration.
+    fn note_visits(&mut self, moment: &Moment<'_, F>) {
+        let p = &mut *self.profile;
+        let since = moment.block.solver_work[0] - self.iterations;
+        let iterations: Vec<usize> = (0..moment.lanes)
+            .map(|lane| since.lane(lane).to_usize())
+            .collect();
+        // a contact is visited while a world that has it goes on, and so is the larger system
+        let executed = |iterations: usize| iterations * lanes_of(moment);
+        let mut coupled = vec![false; moment.lanes];
+        let classes = &moment.constants.contacts.classes;
+        for (class, count) in classes.iter().zip(Watch::count(moment)) {
+            let counts = || {
+                let lanes = iterations.iter().enumerate();
+                let busy = lanes.filter(|&(_, &iterations)| iterations > 0);
+                busy.map(|(lane, &n)| (lane, n, count.lane(lane).to_usize()))
+            };
+            for contact in 0..counts().map(|(_, _, count)| count).max().unwrap_or(0) {
+                let having = || counts().filter(|&(_, _, count)| count > contact);
+                p.contact_lanes.add(having().count());
+                let most = having().map(|(_, n, _)| n).max().unwrap_or(0);
+                let needed = having().map(|(_, n, _)| n).sum();
+                p.lane_contacts.add(needed, executed(most));
+            }
+            if class.couples {
+                counts().for_each(|(lane, _, count)| coupled[lane] |= count > 0);
+            }
+        }
+        let coupling = coupled.iter().zip(&iterations);
+        let coupling = coupling.filter(|(couples, _)| **couples).map(|(_, n)| *n);
+        let most = coupling.clone().max().unwrap_or(0);
+        p.lane_couplings.add(coupling.sum(), executed(most));
+    }
+
     fn note_solve(&mut self, moment: &Moment<'_, F>) {
         let work = (
             &moment.block.solver_work[..],
             &moment.block.solver_block_work[..],
         );
-        let (&[iterations, searches, evaluations], &[_, _, of_block]) = work else {
+        let (&[iterations, searches, evaluations], &[block_iterations, _, block_evaluations]) =
+            work
+        else {
             unreachable!("three counts each")
         };
-        let most = self.note_work(moment.stage, moment.lanes, iterations);
+        let (lanes, pause) = (moment.lanes, moment.block.pause);
+        let of_block = [block_iterations, block_evaluations].map(|x| x.lane(0).to_usize());
+        self.profile.stages[moment.stage].done += (of_block[0] * lanes) as u64;
+        let ends = !pause.paused;
+        if ends {
+            let of_lanes = (0..lanes).map(|lane| iterations.lane(lane).to_usize());
+            self.profile.stages[moment.stage].useful += of_lanes.sum::<usize>() as u64;
+        }
         if moment.evaluates {
             return;
         }
-        self.profile.block_iterations.add(most);
         self.profile
-            .block_evaluations
-            .add(of_block.lane(0).to_usize());
+            .lane_iterations
+            .add(0, of_block[0] * lanes_of(moment));
+        self.profile
+            .lane_evaluations
+            .add(0, of_block[1] * lanes_of(moment));
+        self.note_visits(moment);
+        if !pause.resumes {
+            self.profile.block_iterations.add(of_block[0]);
+            self.profile.block_evaluations.add(of_block[1]);
+        }
+        if !ends {
+            return;
+        }
         let rows = moment.constants.rows();
-        for lane in 0..moment.lanes {
+        for lane in 0..lanes {
             let count = |x: F| x.lane(lane).to_usize();
             self.profile.iterations.add(count(iterations));
             self.profile.searches.add(count(searches));
             self.profile.evaluations.add(count(evaluations));
+            self.profile.lane_iterations.add(count(iterations), 0);
+            self.profile.lane_evaluations.add(count(evaluations), 0);
             let weights = moment.block.efc_weight[..rows].iter();
             let acting = weights.filter(|weight| weight.lane(lane).to_f64() > 0.0);
             let (contacts, contact_rows) = contacts_of(moment, lane);
             self.profile.contacts.add(contacts);
             self.profile.rows.add(acting.count() + contact_rows);
         }
+    }
+}
+
+/// The lanes that a block's work counts for: of a gathered block all, since it is there to fill them.
+fn lanes_of<F: Lane>(moment: &Moment<'_, F>) -> usize {
+    match moment.block.pause.iterates {
+        true => F::WIDTH,
+        false => moment.lanes,
     }
 }
 
@@ -147,7 +217,10 @@ fn contacts_of<F: Lane>(moment: &Moment<'_, F>, lane: usize) -> (usize, usize) {
 impl<F: Lane> Probe<F> for Watch<'_, F> {
     fn before(&mut self, moment: Moment<'_, F>) {
         // they count on in all steps
-        moment.block.solver_work.fill(F::c(0.0));
+        if !moment.block.pause.resumes {
+            moment.block.solver_work.fill(F::c(0.0));
+        }
+        self.iterations = moment.block.solver_work[0];
         moment.block.solver_block_work.fill(F::c(0.0));
         self.begin = Instant::now();
     }
@@ -169,6 +242,17 @@ impl<F: Lane> Probe<F> for Watch<'_, F> {
         } else if (self.place..=self.contact_rows).contains(&moment.stage) {
             self.note_contacts(&moment);
         }
-        self.own_ns += end.elapsed().as_nanos() as u64;
+        self.begin = Instant::now();
+        self.own_ns += (self.begin - end).as_nanos() as u64;
+    }
+
+    fn note_moves(&mut self, worlds: usize) {
+        self.profile.moves += worlds as u64;
+    }
+
+    fn after_part(&mut self, part: Part) {
+        let end = Instant::now();
+        self.profile.parts[part as usize] += (end - self.begin).as_nanos() as u64;
+        self.begin = end;
     }
 }

@@ -1,12 +1,14 @@
-//! A control frame of a chunk: all substeps of a block in cache, then its outputs.
+//! A control frame of a chunk: all substeps of a cluster of blocks in cache, then its outputs.
 
 use super::chunk::{Chunk, Job};
 use super::contacts;
+use super::gathered::few;
 use super::probe::{Moment, Probe, Watch};
 use super::transfer::{self, Arena};
-use crate::backend::{Profile, clocks};
-use sim_physics::arrays::{Field, Slot, Source};
+use crate::backend::{Part, Profile, clocks};
+use sim_physics::arrays::{Field, Pause, Slot, Source};
 use sim_physics::lane::Lane;
+use std::ops::Range;
 use std::time::Instant;
 
 /// Whether the field is a counter that a chunk keeps per world, outside of the state.
@@ -55,51 +57,28 @@ impl<F: Lane> Chunk<F> {
         arena: Arena,
         probe: &mut impl Probe<F>,
     ) {
-        let shape = job.shape;
-        let stride = shape.total() * F::WIDTH;
         self.frames += u64::from(substeps > 0);
-        for block in 0..self.worlds.len().div_ceil(F::WIDTH) {
-            let state = block * stride..(block + 1) * stride;
-            self.load(state.clone());
-            if substeps > 0 {
-                self.draw_command_noise(job, block);
-            }
-            for pass in 0..=substeps {
-                let evaluates = pass == substeps;
-                if evaluates {
-                    if substeps > 0 {
-                        self.note_faults(job, block, state.clone());
-                        self.age_commands(job, block, state.clone());
-                        // outputs are a function of the state: the noise of the next frame is not drawn yet
-                        self.block.command_noise.fill(F::c(0.0));
-                    }
-                    // before the evaluation, which changes the warm start: reading outputs must not change the run
-                    self.store(shape, state.clone());
+        let (blocks, cluster) = (self.worlds.len().div_ceil(F::WIDTH), self.spaces.len());
+        for first in (0..blocks).step_by(cluster) {
+            let cluster = first..(first + cluster).min(blocks);
+            for (k, block) in cluster.clone().enumerate() {
+                self.enter(k);
+                self.load(self.state_of(job, block));
+                if substeps > 0 {
+                    self.draw_command_noise(job, block);
                 }
-                let stages = match (evaluates, substeps) {
-                    (false, _) => &job.step[..],
-                    (true, 0) => &job.evaluate[..],
-                    (true, _) => &job.evaluate_now[..],
-                };
-                for (place, &stage) in stages.iter().enumerate() {
-                    // the last stage goes to the next state
-                    if pass + 1 == substeps && place + 1 == stages.len() {
-                        // SAFETY: by contract.
-                        unsafe { self.evaluate_last(job, block, arena, probe) };
-                    }
-                    // SAFETY: by contract.
-                    unsafe { self.run_stage(job, block, stage, evaluates, probe) };
-                }
+                probe.after_part(Part::Load);
             }
-            if substeps > 0 || job.finds_contacts {
-                self.count_left_out(block);
+            for pass in 0..substeps {
+                let is_last = pass + 1 == substeps;
+                // SAFETY: by contract.
+                unsafe { self.step(job, cluster.clone(), is_last.then_some(arena), probe) };
             }
-            if substeps > 0 {
-                self.note_contacts(&job.constants, block);
+            for (k, block) in cluster.enumerate() {
+                self.enter(k);
+                // SAFETY: by contract.
+                unsafe { self.evaluate(job, block, substeps, arena, probe) };
             }
-            let lags = substeps > 0 && job.evaluate_last.is_some();
-            // SAFETY: the arena holds the layout.
-            unsafe { self.put_fields(job, block, arena, |field| !(lags && field.lags())) };
         }
         for slot in job
             .layout
@@ -110,13 +89,124 @@ impl<F: Lane> Chunk<F> {
             // SAFETY: as above.
             unsafe { self.put_counter(job, slot, arena) };
         }
+        probe.after_part(Part::Fields);
         if substeps > 0 {
             // after the fault was shown, before the commands of the next frame arrive
             if job.faults.resets {
                 self.reset_frozen(job);
             }
             self.regroup(job);
+            probe.after_part(Part::Grouping);
         }
+    }
+
+    /// Where the state of a block is.
+    #[inline(always)]
+    fn state_of(&self, job: &Job<F>, block: usize) -> Range<usize> {
+        let stride = job.shape.total() * F::WIDTH;
+        block * stride..(block + 1) * stride
+    }
+
+    /// Runs a substep of a cluster of blocks; of the last one it writes the fields that belong to it to the arena.
+    ///
+    /// # Safety
+    /// As [`Chunk::run`].
+    #[inline(always)]
+    unsafe fn step(
+        &mut self,
+        job: &Job<F>,
+        blocks: Range<usize>,
+        last: Option<Arena>,
+        probe: &mut impl Probe<F>,
+    ) {
+        let stages = &job.step;
+        let solver = job.pauses.filter(|_| self.gathering.is_some());
+        let mut begin = 0;
+        while begin < stages.len() {
+            // up to the stage that may pause, all blocks of the cluster
+            let pauses = |stage: &usize| solver.is_some_and(|solver| solver.stage == *stage);
+            let end = match stages[begin..].iter().position(pauses) {
+                Some(place) => begin + place + 1,
+                None => stages.len(),
+            };
+            for (k, block) in blocks.clone().enumerate() {
+                self.enter(k);
+                for (place, &stage) in (begin..end).zip(&stages[begin..end]) {
+                    // the last stage goes to the next state
+                    if let (Some(arena), true) = (last, place + 1 == stages.len()) {
+                        // SAFETY: by contract.
+                        unsafe { self.evaluate_last(job, block, arena, probe) };
+                    }
+                    if pauses(&stage) {
+                        self.block.pause.few = few(F::WIDTH);
+                    }
+                    // SAFETY: by contract.
+                    unsafe { self.run_stage(job, block, stage, false, probe) };
+                }
+                if self.block.pause.paused {
+                    // SAFETY: by contract.
+                    unsafe { self.gather(job, k, self.lanes_of(block).len(), probe) };
+                }
+            }
+            // SAFETY: by contract.
+            unsafe { self.end_gathered(job, probe) };
+            for (k, block) in blocks.clone().enumerate() {
+                self.enter(k);
+                let paused = std::mem::take(&mut self.block.pause).paused;
+                if let (Some(solver), true) = (solver, paused) {
+                    self.block.pause.resumes = true;
+                    // SAFETY: by contract.
+                    unsafe { self.run_stage(job, block, solver.stage, false, probe) };
+                    self.block.pause = Pause::default();
+                }
+            }
+            begin = end;
+        }
+    }
+
+    /// Ends a control frame of the block at work: its faults, its state, and what the frame shows of it.
+    ///
+    /// # Safety
+    /// As [`Chunk::run`].
+    #[inline(always)]
+    unsafe fn evaluate(
+        &mut self,
+        job: &Job<F>,
+        block: usize,
+        substeps: usize,
+        arena: Arena,
+        probe: &mut impl Probe<F>,
+    ) {
+        let state = self.state_of(job, block);
+        if substeps > 0 {
+            self.note_faults(job, block, state.clone());
+            self.age_commands(job, block, state.clone());
+            // outputs are a function of the state: the noise of the next frame is not drawn yet
+            self.block.command_noise.fill(F::c(0.0));
+        }
+        // before the evaluation, which changes the warm start: reading outputs must not change the run
+        self.store(job.shape, state);
+        probe.after_part(Part::Store);
+        let stages = if substeps > 0 {
+            &job.evaluate_now
+        } else {
+            &job.evaluate
+        };
+        for &stage in stages {
+            // SAFETY: by contract.
+            unsafe { self.run_stage(job, block, stage, true, probe) };
+        }
+        if substeps > 0 || job.finds_contacts {
+            self.count_left_out(block);
+        }
+        if substeps > 0 {
+            self.note_contacts(&job.constants, block);
+        }
+        probe.after_part(Part::Grouping);
+        let lags = substeps > 0 && job.evaluate_last.is_some();
+        // SAFETY: the arena holds the layout.
+        unsafe { self.put_fields(job, block, arena, |field| !(lags && field.lags())) };
+        probe.after_part(Part::Fields);
     }
 
     /// Runs a stage.
@@ -165,6 +255,7 @@ impl<F: Lane> Chunk<F> {
             }
             self.put_fields(job, block, arena, Field::lags);
         }
+        probe.after_part(Part::Fields);
         self.block.joint_qdd.copy_from_slice(&self.kept);
     }
 
