@@ -50,26 +50,6 @@ impl Histogram {
     }
 }
 
-/// A stage over all blocks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StageProfile {
-    /// Time in steps [ns].
-    pub step_ns: u64,
-    /// Time in evaluations of outputs [ns].
-    pub evaluation_ns: u64,
-    /// Units of work of worlds: contacts that a narrow phase found or that rows were made of, iterations of the solver.
-    pub useful: u64,
-    /// The same, had every world of a block done what the block did.
-    pub done: u64,
-}
-
-impl StageProfile {
-    /// Share of the lanes that waited for others, where the stage's work is counted [–].
-    pub fn masked(&self) -> Option<f64> {
-        (self.done > 0).then(|| 1.0 - self.useful as f64 / self.done as f64)
-    }
-}
-
 /// Work of a kind, in lanes: what blocks did, and what their worlds needed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LaneWork {
@@ -89,6 +69,24 @@ impl LaneWork {
     /// The share that was needed [–]; none of no work.
     pub fn share(&self) -> Option<f64> {
         (self.executed > 0).then(|| self.needed as f64 / self.executed as f64)
+    }
+}
+
+/// A stage over all blocks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageProfile {
+    /// Time in steps [ns].
+    pub step_ns: u64,
+    /// Time in evaluations of outputs [ns].
+    pub evaluation_ns: u64,
+    /// Contacts that a narrow phase found or that rows were made of, iterations of the solver.
+    pub work: LaneWork,
+}
+
+impl StageProfile {
+    /// Share of the lanes that waited for others, where the stage's work is counted [–].
+    pub fn masked(&self) -> Option<f64> {
+        self.work.share().map(|needed| 1.0 - needed)
     }
 }
 

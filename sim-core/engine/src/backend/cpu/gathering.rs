@@ -7,29 +7,11 @@
 use super::chunk::{Chunk, Job, Pauses};
 use super::gathered::{Gathered, Guest, Guests, RETURNS, few, going_on};
 use super::lane_move::{Move, clear_absent_rows};
-use super::probe::{Moment, Probe};
-use super::space::Space;
+use super::probe::Probe;
+use super::run::run_on;
 use crate::backend::Part;
 use sim_physics::arrays::Pause;
 use sim_physics::lane::Lane;
-
-/// What a probe sees of a gathered block.
-#[inline(always)]
-fn moment<'a, F: Lane>(
-    job: &'a Job<F>,
-    space: &'a mut Space<F>,
-    lanes: usize,
-    stage: usize,
-) -> Moment<'a, F> {
-    Moment {
-        constants: &job.constants,
-        block: &mut space.block,
-        memory: &space.memory,
-        lanes,
-        stage,
-        evaluates: false,
-    }
-}
 
 impl<F: Lane> Chunk<F> {
     /// Gathers the worlds of the block at work, `k` of its cluster, that the solver left when it paused. Its first `lanes` lanes
@@ -105,10 +87,9 @@ impl<F: Lane> Chunk<F> {
         let lanes = guests.len();
         clear_absent_rows(&job.constants, &mut space.memory);
         probe.after_part(Part::Gathering);
-        probe.before(moment(job, space, lanes, solver));
+        let at_work = (&mut *space.block, &mut space.memory[..]);
         // SAFETY: by contract.
-        unsafe { job.stages[solver](&job.constants, &mut space.block, &mut space.memory) };
-        probe.after(moment(job, space, lanes, solver));
+        unsafe { run_on(job, at_work, lanes, solver, false, probe) };
         // worlds back to their own blocks; those that go on have other lanes next
         let goes_on = going_on::<F>(&job.constants, &space.block);
         for k in 0..self.spaces.len() {

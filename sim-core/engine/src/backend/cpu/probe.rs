@@ -12,7 +12,7 @@ use std::time::Instant;
 pub(super) struct Moment<'a, F: Lane> {
     pub constants: &'a Constants<F::Real>,
     pub block: &'a mut Block<F, F>,
-    pub memory: &'a [F],
+    pub memory: &'a mut [F],
     /// Lanes that hold a world.
     pub lanes: usize,
     /// The stage, by [`StageId::index`].
@@ -24,9 +24,9 @@ pub(super) struct Moment<'a, F: Lane> {
 /// What watches a chunk run. `()` watches nothing, and costs nothing.
 pub(super) trait Probe<F: Lane> {
     /// Before a stage.
-    fn before(&mut self, _moment: Moment<'_, F>) {}
+    fn before(&mut self, _moment: &mut Moment<'_, F>) {}
     /// After it.
-    fn after(&mut self, _moment: Moment<'_, F>) {}
+    fn after(&mut self, _moment: &mut Moment<'_, F>) {}
     /// After a part of what happens between stages; it began where the last stage or part ended.
     fn after_part(&mut self, _part: Part) {}
     /// Worlds moved to a gathered block.
@@ -78,13 +78,12 @@ impl<'a, F: Lane> Watch<'a, F> {
     }
 
     /// What the worlds of a block did of some work, and what the block did for it.
-    fn note_work(&mut self, stage: usize, lanes: usize, work: F) -> usize {
+    fn note_work(&mut self, stage: usize, lanes: usize, work: F) {
         let of_lanes = (0..lanes).map(|lane| work.lane(lane).to_usize());
         let most = of_lanes.clone().max().unwrap_or(0);
-        let stage = &mut self.profile.stages[stage];
-        stage.useful += of_lanes.sum::<usize>() as u64;
-        stage.done += (most * lanes) as u64;
-        most
+        self.profile.stages[stage]
+            .work
+            .add(of_lanes.sum(), most * lanes);
     }
 
     /// Contacts that a narrow phase found, or of which rows were made.
@@ -149,21 +148,20 @@ impl<'a, F: Lane> Watch<'a, F> {
         };
         let (lanes, pause) = (moment.lanes, moment.block.pause);
         let of_block = [block_iterations, block_evaluations].map(|x| x.lane(0).to_usize());
-        self.profile.stages[moment.stage].done += (of_block[0] * lanes) as u64;
+        let executed = of_block.map(|count| count * lanes_of(moment));
+        // worlds of a block that paused are counted where their solve ends
         let ends = !pause.paused;
-        if ends {
-            let of_lanes = (0..lanes).map(|lane| iterations.lane(lane).to_usize());
-            self.profile.stages[moment.stage].useful += of_lanes.sum::<usize>() as u64;
-        }
+        let needed = [iterations, evaluations].map(|work| match ends {
+            true => (0..lanes).map(|lane| work.lane(lane).to_usize()).sum(),
+            false => 0,
+        });
+        let stage = &mut self.profile.stages[moment.stage];
+        stage.work.add(needed[0], executed[0]);
         if moment.evaluates {
             return;
         }
-        self.profile
-            .lane_iterations
-            .add(0, of_block[0] * lanes_of(moment));
-        self.profile
-            .lane_evaluations
-            .add(0, of_block[1] * lanes_of(moment));
+        self.profile.lane_iterations.add(needed[0], executed[0]);
+        self.profile.lane_evaluations.add(needed[1], executed[1]);
         self.note_visits(moment);
         if !pause.resumes {
             self.profile.block_iterations.add(of_block[0]);
@@ -178,8 +176,6 @@ impl<'a, F: Lane> Watch<'a, F> {
             self.profile.iterations.add(count(iterations));
             self.profile.searches.add(count(searches));
             self.profile.evaluations.add(count(evaluations));
-            self.profile.lane_iterations.add(count(iterations), 0);
-            self.profile.lane_evaluations.add(count(evaluations), 0);
             let weights = moment.block.efc_weight[..rows].iter();
             let acting = weights.filter(|weight| weight.lane(lane).to_f64() > 0.0);
             let (contacts, contact_rows) = contacts_of(moment, lane);
@@ -215,7 +211,7 @@ fn contacts_of<F: Lane>(moment: &Moment<'_, F>, lane: usize) -> (usize, usize) {
 }
 
 impl<F: Lane> Probe<F> for Watch<'_, F> {
-    fn before(&mut self, moment: Moment<'_, F>) {
+    fn before(&mut self, moment: &mut Moment<'_, F>) {
         // they count on in all steps
         if !moment.block.pause.resumes {
             moment.block.solver_work.fill(F::c(0.0));
@@ -225,7 +221,7 @@ impl<F: Lane> Probe<F> for Watch<'_, F> {
         self.begin = Instant::now();
     }
 
-    fn after(&mut self, moment: Moment<'_, F>) {
+    fn after(&mut self, moment: &mut Moment<'_, F>) {
         let end = Instant::now();
         let took = (end - self.begin).as_nanos() as u64;
         let stage = &mut self.profile.stages[moment.stage];
@@ -235,12 +231,12 @@ impl<F: Lane> Probe<F> for Watch<'_, F> {
             stage.step_ns += took;
         }
         if self.solver.contains(&moment.stage) {
-            self.note_solve(&moment);
+            self.note_solve(moment);
         }
         if moment.stage == self.place {
             self.counts.fill(F::c(0.0));
         } else if (self.place..=self.contact_rows).contains(&moment.stage) {
-            self.note_contacts(&moment);
+            self.note_contacts(moment);
         }
         self.begin = Instant::now();
         self.own_ns += (self.begin - end).as_nanos() as u64;

@@ -6,7 +6,7 @@ use super::gathered::few;
 use super::probe::{Moment, Probe, Watch};
 use super::transfer::{self, Arena};
 use crate::backend::{Part, Profile, clocks};
-use sim_physics::arrays::{Field, Pause, Slot, Source};
+use sim_physics::arrays::{Block, Field, Pause, Slot, Source};
 use sim_physics::lane::Lane;
 use std::ops::Range;
 use std::time::Instant;
@@ -14,6 +14,34 @@ use std::time::Instant;
 /// Whether the field is a counter that a chunk keeps per world, outside of the state.
 fn is_counter(field: Field) -> bool {
     field.row().source == Source::Counter
+}
+
+/// Runs a stage on a block and its memory of contacts. Its first `lanes` lanes have worlds.
+///
+/// # Safety
+/// The processor has the instructions of the job's stages.
+#[inline(always)]
+pub(super) unsafe fn run_on<F: Lane>(
+    job: &Job<F>,
+    (block, memory): (&mut Block<F, F>, &mut [F]),
+    lanes: usize,
+    stage: usize,
+    evaluates: bool,
+    probe: &mut impl Probe<F>,
+) {
+    let constants = &job.constants;
+    let mut moment = Moment {
+        constants,
+        block,
+        memory,
+        lanes,
+        stage,
+        evaluates,
+    };
+    probe.before(&mut moment);
+    // SAFETY: by contract.
+    unsafe { job.stages[stage](constants, moment.block, moment.memory) };
+    probe.after(&mut moment);
 }
 
 impl<F: Lane> Chunk<F> {
@@ -223,12 +251,9 @@ impl<F: Lane> Chunk<F> {
         probe: &mut impl Probe<F>,
     ) {
         let lanes = self.lanes_of(block).len();
-        probe.before(self.moment(job, lanes, stage, evaluates));
+        let at_work = (&mut *self.block, &mut self.memory[..]);
         // SAFETY: by contract.
-        unsafe {
-            job.stages[stage](&job.constants, &mut self.block, &mut self.memory);
-        }
-        probe.after(self.moment(job, lanes, stage, evaluates));
+        unsafe { run_on(job, at_work, lanes, stage, evaluates, probe) };
     }
 
     /// Evaluates and writes the fields that belong to the last substep, before its last stage goes to the next state.
@@ -296,25 +321,6 @@ impl<F: Lane> Chunk<F> {
                     }
                 }
             }
-        }
-    }
-
-    /// What a probe sees of a stage.
-    #[inline(always)]
-    fn moment<'a>(
-        &'a mut self,
-        job: &'a Job<F>,
-        lanes: usize,
-        stage: usize,
-        evaluates: bool,
-    ) -> Moment<'a, F> {
-        Moment {
-            constants: &job.constants,
-            block: &mut self.block,
-            memory: &self.memory,
-            lanes,
-            stage,
-            evaluates,
         }
     }
 
