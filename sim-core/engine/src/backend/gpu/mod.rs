@@ -33,8 +33,8 @@
 //! CPU where a GPU does not start, and the daemon's notes say why.
 //!
 //! # What is measured
-//! On an H100 (`benches/results`, `gpu_cuts.csv`), with 4096 worlds: eight threads per world take 1 % less of a frame than four in the
-//! grasp and 11 % less for a quadruped on the ground. Kernels of 12,000 statements instead of 6,000 take 8 % less in the grasp and 4 %
+//! On an H100 (`benches/results`, `gpu_cuts.csv`), with 4096 worlds: eight threads per world take 3 % less of a frame than four in the
+//! grasp and 11 % less for a quadruped on the ground. Kernels of 12,000 statements instead of 6,000 take 3 % less in the grasp and 5 %
 //! more in the other. Other cards were not measured.
 
 mod backend;
