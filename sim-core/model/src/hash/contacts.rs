@@ -32,7 +32,7 @@ view! {
         Later { "turning": turning }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
-        => impedances, bodies;
+        => are_stiff, impedances, bodies;
     Handles as "Handles":
         Always {
             "pair_numbers": pair_numbers,
@@ -107,7 +107,8 @@ view! {
             "first": first,
             "capacity": capacity,
         }
-        Later { "turns": turns };
+        Later { "turns": turns }
+        => update_path;
     Column as "Column":
         Always { "dof": dof, "is_first": is_first, "lever": lever };
     Run as "Run":

@@ -17,6 +17,7 @@ use super::fields::{
 };
 use super::pause::Pause;
 use crate::constants::Constants;
+use crate::constants::contact::DIRECTIONS_MAX;
 use crate::constants::options::Integrator;
 use crate::lane::{Num, Real};
 
@@ -252,6 +253,9 @@ arrays! { m;
         // copies that are factored in place
         hessian: Hessian [Scalar; m.pattern.len()] Scratch "–";
         coupled_hessian: CoupledHessian [Scalar; m.coupled.pattern.len()] Scratch "–";
+        // where contacts may be stiff: M and the rows of joints, then a factor; two scalars for each dof and direction of a contact
+        joint_system: JointSystem [Scalar; if m.contacts.are_stiff { m.pattern.len() } else { 0 }] Scratch "–";
+        update_vectors: UpdateVectors [Scalar; if m.contacts.are_stiff { 2 * DIRECTIONS_MAX * m.dofs.len() } else { 0 }] Scratch "–";
         // dof by dof: accelerations that an iteration starts from, where it goes, the step between; those of the integrator;
         // M or Jᵀ times a vector; what inverse dynamics leaves unexplained
         start: Start [Scalar; m.dofs.len()] Scratch "rad/s² or m/s²";

@@ -7,6 +7,7 @@ use super::hull::HullTables;
 use super::pair_groups::Group;
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
+use crate::math::factor::UpdatePath;
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,6 +74,8 @@ recast! {
         pub cone: Cone,
         /// Friction impedance over normal impedance [–].
         pub impratio: R,
+        /// Are contacts so stiff that single precision loses the mass matrix beside them?
+        pub are_stiff: bool,
         /// Shapes that some pair has.
         pub solids: Vec<Solid<R>>,
         /// Pairs by kinds.
@@ -255,6 +258,8 @@ recast! {
         pub entries: Vec<Vec<Run>>,
         /// Does any entry lie outside the pattern of the mass matrix?
         pub couples: bool,
+        /// What its contacts change of the factor of that matrix, from its columns.
+        pub update_path: UpdatePath,
         /// Parts of the mass matrix that its columns are of, each once, as [`Pattern::parts`](crate::math::factor::Pattern::parts) counts them.
         pub parts: Vec<usize>,
         /// Scalars of a pair that are the same for all of its pairs.
@@ -432,6 +437,9 @@ pub mod turning {
     pub const JACOBIAN: usize = 15;
 }
 
+/// Directions in which a contact pushes or rubs, at most.
+pub const DIRECTIONS_MAX: usize = 6;
+
 /// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
 pub const MU_MIN: f64 = 1e-5;
 
@@ -465,6 +473,7 @@ impl<R: Real> Contacts<R> {
         Contacts {
             cone,
             impratio: R::from_f64(impratio),
+            are_stiff: false,
             solids: Vec::new(),
             groups: Vec::new(),
             classes: Vec::new(),
@@ -511,4 +520,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Fixed, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory, TouchedBodies }
+same! { Fixed, UpdatePath, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory, TouchedBodies }

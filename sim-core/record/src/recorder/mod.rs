@@ -58,6 +58,7 @@ impl Cx for Recorder {
     type List = RecordedList;
 
     const GATHERS_LOADS: bool = true;
+    const UPDATES_FACTORS: bool = false;
 
     #[track_caller]
     fn var(&mut self, x: Recorded) -> RecordedVariable {

@@ -15,13 +15,19 @@ use pairs::ContactBuilder;
 use pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
 use sensors::add_touched_bodies;
 use sim_physics::constants::contact::{
-    Class, Column, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run, pair, row,
+    Class, Column, Cone, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run, pair, row,
 };
 use sim_physics::constants::pair_groups::Group;
+use sim_physics::constants::params::Param;
 use sim_physics::constants::{Constants, Coupled, Impedance};
 use sim_physics::lane::Fixed;
-use sim_physics::math::factor::Pattern;
+use sim_physics::math::factor::{Pattern, UpdatePath};
+use sim_physics::step::constraints::contact_rows::{EDGES_MAX, edge_stiffness};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Stiffness of a contact over the mass of what it moves, above which single precision may lose that mass in their sum [–]. Levers
+/// make the entries of a matrix ten times as stiff, so this is a tenth of what the solver allows there.
+const STIFFNESS_MAX: f64 = 3e4;
 
 /// Finds the pairs and sorts them into classes.
 pub(super) fn add_contacts(
@@ -105,6 +111,9 @@ impl ContactBuilder<'_> {
                 contacts.pairs[p] = self.names(pairs[p], &sides, k);
             }
         }
+        let mu: Vec<f64> = (0..pairs.len())
+            .map(|p| numbers[p * stride + pair::MU])
+            .collect();
         contacts.groups = self.groups(pairs);
         let bounds: Vec<usize> = members
             .values()
@@ -138,6 +147,7 @@ impl ContactBuilder<'_> {
         }
         self.add_combine(contacts, pairs);
         contacts.two_point_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
+        contacts.are_stiff = self.are_stiff(pairs, &mu);
         let coupled = self.coupled(contacts);
         for class in &mut contacts.classes {
             let pattern = match class.couples {
@@ -148,6 +158,10 @@ impl ContactBuilder<'_> {
             for (row, entries) in columns.iter().zip(&mut class.entries) {
                 let place = |column: usize| (column, pattern.at(row.dof, columns[column].dof));
                 *entries = Run::from_columns(entries.iter().flat_map(Run::columns).map(place));
+            }
+            if contacts.are_stiff {
+                let dofs: Vec<usize> = columns.iter().map(|column| column.dof).collect();
+                class.update_path = UpdatePath::new(pattern, &dofs);
             }
         }
         coupled
@@ -164,6 +178,23 @@ impl ContactBuilder<'_> {
         }
         columns.sort_unstable();
         columns
+    }
+
+    /// Whether some contact may be [`STIFFNESS_MAX`] times as stiff as its bodies are heavy; `mu` are the coefficients of friction.
+    fn are_stiff(&self, pairs: &[(usize, usize)], mu: &[f64]) -> bool {
+        let impratio = self.scene.solver.impratio;
+        let varies = self.scene.params.contains(&Param::ShapeMu);
+        pairs.iter().zip(mu).any(|(&pair, &mu)| {
+            let impedance = self.impedance(pair);
+            let d = impedance.d_min.max(impedance.d_max);
+            // D is d / (1 - d) over the inverse weight of the bodies; friction is impratio times as stiff, and a pyramid has four edges
+            let ratio = match self.scene.solver.cone {
+                Cone::Elliptic => impratio,
+                Cone::Pyramidal if varies => 4.0 * EDGES_MAX,
+                Cone::Pyramidal => 4.0 * edge_stiffness(impratio, mu).min(EDGES_MAX),
+            };
+            d / (1.0 - d) * ratio > STIFFNESS_MAX
+        })
     }
 
     /// Gives pairs their impedances, unless all have that of the scene.
@@ -316,6 +347,8 @@ impl ContactBuilder<'_> {
             runs: Run::from_columns(columns.iter().enumerate().map(|(c, &(dof, _))| (c, dof))),
             entries,
             couples,
+            // as the places of entries
+            update_path: UpdatePath::default(),
             parts: parts.into_iter().collect(),
             shared,
             first: 0,

@@ -8,13 +8,18 @@
 //! - [`dense`]: small full blocks, such as an arm, unrolled,
 //! - [`tree`]: trees, unrolled along their paths,
 //! - [`general`]: other blocks, three rows at a time, by the runs of their columns.
+//!
+//! [`rows`] is for matrices that few worlds factor. [`update`] has the rows that rank-one updates reach; the solver makes them.
 
 mod dense;
 mod general;
 mod pattern;
+mod rows;
 mod tree;
+mod update;
 
 pub use pattern::Pattern;
+pub use update::UpdatePath;
 
 use crate::lane::Num;
 use pattern::{Block, Kind};
@@ -34,6 +39,23 @@ pub fn solve<F: Num>(pattern: &Pattern, a: &mut [F], x: &mut [F]) {
             Kind::Dense | Kind::Tree => tree::solve(pattern, block, a, x),
             Kind::General => general::solve(pattern, block, a, x),
         }
+    }
+}
+
+/// Replaces A by its factor, as [`solve`] leaves it.
+#[inline(always)]
+pub fn decompose<F: Num>(pattern: &Pattern, a: &mut [F]) {
+    for block in pattern.blocks() {
+        rows::decompose(pattern, block, block.of_matrix(a));
+    }
+}
+
+/// Replaces x by A⁻¹ x, for the factor of A.
+#[inline(always)]
+pub fn substitute<F: Num>(pattern: &Pattern, factor: &[F], x: &mut [F]) {
+    for block in pattern.blocks() {
+        let x = &mut x[block.range()];
+        rows::substitute(pattern, block, block.of_matrix_ref(factor), x);
     }
 }
 
@@ -129,7 +151,13 @@ mod tests {
             let row = (0..size).filter_map(|j| pattern.find(i, j).map(|at| a[at] * x[j]));
             assert!((row.sum::<f64>() - b[i]).abs() < 1e-12, "row {i} of A x");
         }
+        let mut factor = a.clone();
+        decompose(&pattern, &mut factor);
+        let mut by_factor = b.clone();
+        substitute(&pattern, &factor, &mut by_factor);
         solve(&pattern, &mut a, &mut b);
+        // the same bits, but for the sign of a zero
+        assert_eq!((factor, by_factor), (a, b.clone()));
         for (got, expected) in b.iter().zip(&x) {
             assert!((got - expected).abs() < 1e-13, "{got}, expected {expected}");
         }

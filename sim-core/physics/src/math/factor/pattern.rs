@@ -354,6 +354,18 @@ impl Pattern {
         column == row || (column >= block.first && path.contains(&(column - block.first)))
     }
 
+    /// Columns before the diagonal of a row that it has.
+    pub(super) fn columns(&self, row: usize) -> impl Iterator<Item = usize> + '_ {
+        let first = self.blocks[self.block_of[row]].first;
+        let columns = &self.path_rows[self.path_bounds[row]..self.path_bounds[row + 1]];
+        columns.iter().map(move |column| first + column)
+    }
+
+    /// Where a row begins, and the place of its column in rows that have it: [`Pattern::at`] is their sum.
+    pub(super) fn start_and_place(&self, row: usize) -> (usize, usize) {
+        (self.starts[row], self.places[row])
+    }
+
     #[inline(always)]
     pub(super) fn blocks(&self) -> &[Block] {
         &self.blocks
@@ -389,6 +401,14 @@ impl Pattern {
     #[inline(always)]
     pub(super) fn columns_above(&self, tile: &Tile) -> &[Run] {
         &self.tile_runs[tile.runs.0..tile.runs.1]
+    }
+
+    /// Scalars of a row of a block, both counted from the block's first; the diagonal is the last.
+    #[inline(always)]
+    pub(super) fn row(&self, block: &Block, row: usize) -> std::ops::Range<usize> {
+        let k = block.first + row;
+        let start = self.starts[k] - block.offset;
+        start..start + self.places[k] + 1
     }
 
     /// Segments of a tree, in the order of their rows.

@@ -287,7 +287,7 @@ impl<'a, C: Cx> Contact<'a, C> {
 
 /// D of a pyramid's edge over that of the elliptic cone's normal row: impratio / (2 μ² (1 + μ²)).
 #[inline(always)]
-fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
+pub fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
     // D / D₀, bounded in `f32`
     let square = mu * mu;
     let mut edges = F::k(impratio).div(square + square);
@@ -301,9 +301,9 @@ fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
 
 /// Upper bound of [`edge_stiffness`] in `f32` [–].
 ///
-/// An edge is then as rigid as `f32` can resolve. With 20 times as much, rounding threw bodies off. MuJoCo's is larger for
-/// mu < 0.22 at the default impratio of 1000.
-const EDGES_MAX: f64 = 1e4;
+/// With 20 times as much, rounding threw bodies off before stiff contacts were added to factors (`solver::updates`). MuJoCo's is larger
+/// for mu < 0.22 at the default impratio of 1000.
+pub const EDGES_MAX: f64 = 1e4;
 
 /// The difference between MuJoCo's J q̈ and ours. The acceleration of a free joint is that of its frame's origin there, of the
 /// centre of mass here: they differ by ω × (ω × r). None where every centre of mass is its frame's origin.

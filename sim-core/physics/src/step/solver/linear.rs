@@ -1,7 +1,8 @@
 //! The linear system of an iteration, H x = rhs, with the terms of contacts.
 
 use super::hold::Hold;
-use super::{assembly, contacts, gather};
+use super::{assembly, contacts, gather, updates};
+use crate::arrays::Workspace;
 use crate::constants::Constants;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{Pattern, solve as solve_linear};
@@ -14,6 +15,33 @@ pub(super) enum Unknown<C: Cx> {
     Minimum(Option<Hold<C>>),
     /// A correction of accelerations, in `missing`.
     Missing,
+}
+
+/// Where an unknown is kept.
+#[derive(Clone, Copy)]
+pub(super) enum Target {
+    Minimum,
+    Missing,
+}
+
+impl Target {
+    #[inline(always)]
+    pub fn values<F: Num>(self, w: &mut Workspace<F>) -> &mut [F] {
+        match self {
+            Target::Minimum => &mut w.minimum,
+            Target::Missing => &mut w.missing,
+        }
+    }
+}
+
+impl<C: Cx> Unknown<C> {
+    #[inline(always)]
+    fn target(&self) -> Target {
+        match self {
+            Unknown::Minimum(_) => Target::Minimum,
+            Unknown::Missing => Target::Missing,
+        }
+    }
 }
 
 /// Worlds whose contacts couple dofs that the mass matrix does not couple; none if no world has such contacts. `touching` is
@@ -36,11 +64,35 @@ pub(super) fn coupling<C: Cx>(
 /// `coupling` that of [`coupling`].
 ///
 /// Returns the largest ratio of diagonal entries of H and M: how much stiffer contacts make the system.
+#[inline(always)]
+pub(super) fn solve_system<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    x: Unknown<C>,
+    touching: Option<MaskOf<C>>,
+    coupling: Option<MaskOf<C>>,
+) -> C::F {
+    let stiff_touching = touching.filter(|_| updates::may_be_stiff::<C>(&m.contacts));
+    let target = x.target();
+    // worlds whose matrix turns out to have lost M solve once more, from M and the rows of joints
+    if stiff_touching.is_some() {
+        b.work.joint_system.copy_from_slice(&b.work.hessian);
+    }
+    let stiffening = solve_sum::<_, TURNS>(cx, m, b, x, touching, coupling);
+    if let Some(touching) = stiff_touching {
+        updates::solve_again::<_, TURNS>(cx, m, b, target, (stiffening, touching), coupling);
+    }
+    without_signs_of_zeros(target.values(&mut b.work));
+    stiffening
+}
+
+/// [`solve_system`] by the sum of M and the terms of all rows.
 ///
 /// A world whose contacts couple dofs that the mass matrix does not couple solves a larger system. A block in lockstep solves it
 /// for all of its worlds.
 #[inline(always)]
-pub(super) fn solve_system<C: Cx, const TURNS: bool>(
+fn solve_sum<C: Cx, const TURNS: bool>(
     cx: &mut C,
     m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
@@ -124,7 +176,6 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     if solves_both {
         gather(cx, &b.solution, vector);
     }
-    without_signs_of_zeros(vector);
     cx.get(&stiffening)
 }
 
@@ -138,7 +189,7 @@ fn without_signs_of_zeros<F: Num>(vector: &mut [F]) {
 
 /// Copies a system to the places that it has in a larger one, which is 0 elsewhere.
 #[inline(always)]
-fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], larger: &mut [C::V]) {
+pub(super) fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], larger: &mut [C::V]) {
     for cell in &mut *larger {
         cx.put(cell, C::F::c(0.0));
     }
@@ -148,7 +199,7 @@ fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], larger: &mut [C:
     }
 }
 
-/// The largest ratio of diagonal entries of H and M; 1 in `f64`, which does not ask.
+/// The largest ratio of diagonal entries of H and M; 1 where nobody asks.
 #[inline(always)]
 fn stiffening_of<F: Num>(
     m: &Constants<F::Real>,
@@ -157,8 +208,9 @@ fn stiffening_of<F: Num>(
     mass_matrix: &[F],
 ) -> F {
     let mut largest = F::c(1.0);
-    // H(j,j) / M(j,j) scales the rounding of the step, which inverse dynamics corrects if the model has refinements
-    if !F::Real::DOUBLE && m.solver.refinements == 0 {
+    // H(j,j) / M(j,j) scales the rounding of the step, which inverse dynamics corrects if the model has refinements; it also tells
+    // whether H has lost M
+    if !F::Real::DOUBLE && (m.solver.refinements == 0 || m.contacts.are_stiff) {
         for j in 0..m.dofs.len() {
             let ratio = hessian[pattern.at(j, j)].div(mass_matrix[m.pattern.at(j, j)]);
             largest = ratio.max(largest);

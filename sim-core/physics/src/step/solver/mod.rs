@@ -34,6 +34,9 @@
 //! a⁺ - a, not for a⁺. It ends where the gain is what rounding alone would promise ([`Line::noise`]). A whole step that found
 //! the minimum is followed by one more, unless that could gain less than the tolerance (see [`Progress::plan`]).
 //!
+//! Stiffer contacts leave no digit of M in the sum M + Jᵀ W J. In worlds with such a sum, contacts are added to the factor of M
+//! ([`updates`]). Backends that record code are without ([`Cx::UPDATES_FACTORS`]).
+//!
 //! Where the mass matrix loses too many digits in `f32`, [`refine`] corrects the accelerations by inverse dynamics.
 //!
 //! # Pauses
@@ -59,6 +62,7 @@
 //! | `spread` | the system, and products with M, where several lanes share a world |
 //! | `ties` | sums over constraints with Jacobians found at run time |
 //! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
+//! | `updates` | contacts added to the factor of M, where they are too stiff for `f32` |
 //! | `turning` | laws of contacts with torsional and rolling friction |
 //! | `start` | where `f64` starts |
 //! | `line` | the line search |
@@ -86,6 +90,7 @@ mod spread;
 mod start;
 mod ties;
 mod turning;
+mod updates;
 
 pub use refine::{Accelerations, Refine};
 

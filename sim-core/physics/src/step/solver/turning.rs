@@ -124,7 +124,7 @@ pub(super) fn dot<F: Num>(u: [F; 6], v: [F; 6]) -> F {
 }
 
 #[inline(always)]
-fn elliptic<F: Num>(
+pub(super) fn elliptic<F: Num>(
     impratio: F::Real,
     jar: [F; 6],
     [stiff, soft, mu]: [F; 3],
@@ -180,7 +180,7 @@ fn elliptic<F: Num>(
 
 /// Two edges for each direction of friction that the contact has; `exists` is 1 for the rotations that it has, else 0.
 #[inline(always)]
-fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw<F> {
+pub(super) fn pyramidal<F: Num>(jar: [F; 6], stiff: F, mu: F, exists: [F; 3]) -> TurningLaw<F> {
     let (zero, half) = (F::c(0.0), F::c(0.5));
     let square = mu * mu;
     let mut law = TurningLaw {

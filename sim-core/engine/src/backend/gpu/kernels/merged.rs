@@ -7,6 +7,7 @@
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Class, Column, Contacts, Memory, Run, pair, row};
 use sim_physics::lane::{Fixed, Table};
+use sim_physics::math::factor::UpdatePath;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -199,6 +200,8 @@ fn class(
         runs: Run::from_columns(of_dofs),
         entries: entries.collect(),
         couples,
+        // kernels have no updates
+        update_path: UpdatePath::default(),
         parts: parts.into_iter().collect(),
         shared: shared.collect(),
         first: 0,
