@@ -271,7 +271,7 @@ pub trait Cx: Sized {
     /// Does a backend wait long for what it loads, and is its code recorded? Then loads that do not depend on each other stand
     /// together.
     const GATHERS_LOADS: bool = false;
-    /// Does the solver add stiff contacts to a factor? Recorded code would be three times as long, and is without.
+    /// Does the solver add stiff contacts to a factor? Recorded code would be longer, and is without.
     const UPDATES_FACTORS: bool = true;
     /// Values that loops change: the values themselves on a backend where those are cells, else the cells. Call
     /// [`Cx::put_values`] before, and [`Cx::get_values`] after.

@@ -1,7 +1,6 @@
 //! Rows of a factor that rank-one updates reach.
 
 use super::pattern::Pattern;
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Rows that an update of a factor changes, the last one first: those in which the vector may differ from 0, and all that
@@ -22,14 +21,20 @@ pub struct UpdatePath {
 impl UpdatePath {
     /// The path of vectors that are 0 but for some rows: `of`.
     pub fn new(pattern: &Pattern, of: &[usize]) -> UpdatePath {
-        // rows to come, and those of the path so far that have an entry in their column
-        let mut rows: BTreeMap<usize, Vec<Range<usize>>> = BTreeMap::new();
-        rows.extend(of.iter().map(|&row| (row, Vec::new())));
+        // rows to come, with the rows of the path so far that have an entry in their column
+        let size = of.iter().max().map_or(0, |last| last + 1);
+        let mut rows: Vec<Option<Vec<Range<usize>>>> = vec![None; size];
+        for &row in of {
+            rows[row] = Some(Vec::new());
+        }
         let mut path = UpdatePath::default();
-        while let Some((row, before)) = rows.pop_last() {
+        for row in (0..size).rev() {
+            let Some(before) = rows[row].take() else {
+                continue;
+            };
             let k = path.starts.len();
             for column in pattern.columns(row) {
-                let before = rows.entry(column).or_default();
+                let before = rows[column].get_or_insert_default();
                 match before.last_mut() {
                     Some(range) if range.end == k => range.end += 1,
                     _ => before.push(k..k + 1),

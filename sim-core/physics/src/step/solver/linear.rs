@@ -199,7 +199,7 @@ pub(super) fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], large
     }
 }
 
-/// The largest ratio of diagonal entries of H and M; 1 where nobody asks.
+/// The largest ratio of diagonal entries of H and M; 1 where it is of no use.
 #[inline(always)]
 fn stiffening_of<F: Num>(
     m: &Constants<F::Real>,
