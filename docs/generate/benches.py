@@ -84,7 +84,8 @@ priority. Predictive sampling with 128 worlds and 25 frames plans all the time o
     ),
     "contacts": Bench(
         "Arm with contacts, beside MuJoCo C on one thread",
-        """The arm is the published FR3 with its meshes as convex hulls. The demos:
+        """The arm is an FR3. `robot` below a table says which: the published one has its meshes as convex hulls, the
+project's own one has boxes, cylinders and spheres. The demos:
 
 - `torque`: recorded torques above a table
 - `grasp`: a recorded grasp of a cube
@@ -96,7 +97,6 @@ Keep in mind:
 - The solver dominates under random targets. A SIMD register waits for the slowest of its 16 worlds, and each world can
   need a dozen Newton iterations when contacts begin or slide.
 - For that reason, tightloop groups worlds with similar contacts in the same registers.
-- The machine with 2 cores is shared. On another day it was 1.6 times as fast for MuJoCo, and twice for tightloop.
 """,
         {"demo": "demo", "worlds_alike": "commands", "worlds": "worlds", **_BESIDE_MUJOCO},
         _COMMANDS,

@@ -27,16 +27,18 @@ This page has the newest table of each topic. `make docs` builds it with those o
 ## Summary
 
 These rows use independent commands. The rows of MuJoCo compare one thread with one thread. In the rows of EnvPool and
-gymnasium, each side uses all four cores of a 4-core machine. The other rows come from a 2-core machine.
+gymnasium, each side uses all four cores of a 4-core machine. The other rows come from 2-core machines with AVX-512: the
+first two from an Intel Xeon, the rest from an AMD EPYC.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
-- **Hulls differ.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64 of a URDF's mesh, and
-  all of a MuJoCo model's.
+- **The arm has no meshes.** In its rows with contacts beside `rollout`, its links are boxes, cylinders and spheres.
+  [Its section](#arm-with-contacts-beside-mujoco-c-on-one-thread) names results with the published meshes.
+- **Hulls differ only for URDF.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64 of a
+  URDF's mesh, and all of a MuJoCo model's.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
   iterations.
-- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C. That machine has
-  AVX-512 too.
+- **mjbatch has [its own table](#mujoco-models-beside-mjbatch-on-one-thread).** It steps MuJoCo C.
 - **Contacts cost more than joints.** Robots on the ground gain less than arms in the air: worlds that share a register
   wait for the one with the most contacts.
 """
@@ -78,20 +80,20 @@ def _environments(peer: str, side: str) -> Line:
 
 def _on_the_ground(workload: str, model: str, steps_per_call: int) -> Line:
     row = {"model": model, "steps_per_call": str(steps_per_call)}
-    place = "intel-r-xeon-r-processor-2-cores/mujoco_models.csv"
+    place = "amd-epyc-2-cores/mujoco_models.csv"
     ratio = row | {"column": "median_ratio"}
     return Line(workload, "mjbatch 0.1.4", place, row, row, "mjbatch_steps_per_s", "tightloop_steps_per_s", ratio)
 
 
 _ROLLOUT = "MuJoCo C 3.17, `rollout`"
-_CONTACTS = "intel-r-xeon-r-processor-2-cores/contacts.csv"
+_CONTACTS = "amd-epyc-2-cores/contacts.csv"
 SUMMARY = (
     _peers("FR3 arm, position targets, no contacts", "target"),
     _peers("FR3 arm, torques, no contacts", "torque"),
     _beside("FR3 arm, torques, above its table", _CONTACTS, {"demo": "torque", "worlds_alike": "no"}),
     _beside("FR3 arm grasps a cube", _CONTACTS, {"demo": "grasp", "worlds_alike": "no"}),
     _beside("FR3 arm and cube, random targets", _CONTACTS, {"demo": "random", "worlds_alike": "no"}),
-    _beside("Quadruped, 18 dofs, no contacts", "intel-r-xeon-r-processor-2-cores/legged.csv", {"robot": "quadruped"}),
+    _beside("Quadruped, 18 dofs, no contacts", "amd-epyc-2-cores/legged.csv", {"robot": "quadruped"}),
     _on_the_ground("Go1 on the ground, feet only", "mjlab Go1, feet only", 4),
     _on_the_ground("G1 humanoid on the ground", "MuJoCo-Warp G1, flat", 4),
     _on_the_ground("Go1 falls and lies, all of it touches", "mjlab Go1 heap, pyramidal", 8),

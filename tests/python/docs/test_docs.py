@@ -209,11 +209,19 @@ def test_the_readme_claims_no_more_than_was_measured():
 
 
 def test_the_readme_says_what_robots_on_the_ground_gain():
-    rows = performance.read(performance.RESULTS / "intel-r-xeon-r-processor-2-cores/mujoco_models.csv").rows
+    rows = performance.read(performance.RESULTS / "amd-epyc-2-cores/mujoco_models.csv").rows
     ratios = [float(row["median_ratio"]) for row in rows]
-    said = re.search(r"on the ground gain less: (\d+) to (\d+) times", performance.README.read_text())
+    (rate,) = [
+        float(row["tightloop_steps_per_s"])
+        for row in rows
+        if row["model"] == "MuJoCo-Warp G1, flat" and row["steps_per_call"] == "4"
+    ]
+    text = performance.README.read_text()
+    said = re.search(r"on the ground gain less: (\d+) to (\d+) times", text)
     assert said is not None
     assert [int(number) for number in said.groups()] == [round(min(ratios)), round(max(ratios))]
+    said = re.search(r"A G1 humanoid makes (\d+) thousand steps per second", text)
+    assert said is not None and int(said[1]) == round(rate / 1000)
 
 
 def test_the_performance_page_names_every_result_and_the_site_has_its_rows():
