@@ -106,7 +106,7 @@ use hold::Hold;
 use line::{Line, search};
 use own_rows::own_rows;
 use progress::{Pieces, Plan, Progress, SearchResult};
-use rows::{Acting, Jacobian, assemble, forces, residual};
+use rows::{Acting, Jacobian, along_step, assemble, forces, residual};
 use spread::Spread;
 use start::choose_start;
 
@@ -408,10 +408,7 @@ fn search_segment<C: Cx, const TURNS: bool>(
             curvature = w.step[j].fma(w.joint_force[j], curvature);
             power = power + (w.smooth_force[j] * w.start[j]).abs();
         }
-        // of limits that do not act both are undefined, and not read
-        for r in 0..m.rows() {
-            w.jar_minimum[r] = w.jar_minimum[r] - w.jar[r];
-        }
+        along_step(m, acting, &w.jar, &mut w.jar_minimum);
         // p at α = 0: its descent, and the rounding in it
         let lane_rows = own_rows(cx, m, &b.params, &b.work);
         let line = Line::new::<C, TURNS>(

@@ -200,6 +200,29 @@ pub(super) fn residual<F: Num>(
     ties::residual(m, jacobian.ties, aref, a, jar);
 }
 
+/// J s = jar(a⁺) - jar(a) of the rows that act, in the place of jar(a⁺).
+#[inline(always)]
+pub(super) fn along_step<F: Num>(
+    m: &Constants<F::Real>,
+    acting: Acting,
+    jar: &[F],
+    jar_minimum: &mut [F],
+) {
+    let first = m.equalities.len() + m.frictions.len();
+    for r in 0..first {
+        jar_minimum[r] = jar_minimum[r] - jar[r];
+    }
+    // of limits that do not act both are undefined
+    for run in acting.runs() {
+        for r in first + run.start..first + run.end {
+            jar_minimum[r] = jar_minimum[r] - jar[r];
+        }
+    }
+    for r in m.joint_rows()..m.rows() {
+        jar_minimum[r] = jar_minimum[r] - jar[r];
+    }
+}
+
 /// f + W J a, or f alone where the solver `corrects`.
 #[inline(always)]
 pub(super) fn pull<F: Num>(law: &Law<F>, jar: F, aref: F, corrects: Option<F::Mask>) -> F {
