@@ -32,8 +32,8 @@ impl Recording {
     /// rounding.
     ///
     /// # Panics
-    /// If there are not as many inputs as were recorded, less scratch memory than [`Recording::scratch`], or if an
-    /// index of the tables is not below its end.
+    /// If what was assumed to hold nowhere holds, if there are not as many inputs as were recorded, less scratch memory than
+    /// [`Recording::scratch`], or if an index of the tables is not below its end.
     pub fn evaluate(&self, inputs: &[f32], scratch: &mut [f32], tables: &Tables<f32>) -> Vec<f32> {
         assert_eq!(
             inputs.len(),
@@ -61,6 +61,8 @@ impl Recording {
         }
         let all = Active::MAX >> (Active::BITS as usize - lanes);
         interpreter.run(&self.body, all);
+        let refuses = (self.assumed).is_some_and(|mask| interpreter.operand(mask, 0) != 0.0);
+        assert!(!refuses, "what was assumed to hold nowhere holds");
         self.outputs
             .iter()
             .map(|x| interpreter.operand(*x, 0))

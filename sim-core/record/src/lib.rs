@@ -28,7 +28,7 @@
 
 mod error;
 mod evaluate;
-mod ir;
+pub mod ir;
 mod passes;
 mod record;
 mod recorder;

@@ -38,7 +38,8 @@ pub fn record(
     if let Some(error) = state.take_error() {
         return Err(error);
     }
-    dead_code::prune(&state.values, &mut body, &outputs, place)?;
+    let kept: Vec<Operand> = outputs.iter().copied().chain(state.assumed).collect();
+    dead_code::prune(&state.values, &mut body, &kept, place)?;
     let mut values = state.values.iter().map(|v| v.op).collect();
     let mut names = state.counters().names as usize;
     loop_fusion::fuse(&mut body, &mut values, &mut names);
@@ -49,6 +50,7 @@ pub fn record(
         values,
         scratch: 0,
         lanes: state.lanes,
+        assumed: state.assumed,
         body,
     };
     recording.scratch = recording.reach();

@@ -1,5 +1,7 @@
 //! The intermediate representation: statements over values, and what each names.
+//!
+//! It is public for the crate `sim-compile`, which turns it into machine code.
 
 pub(crate) mod recording;
-pub(crate) mod tree;
+pub mod tree;
 pub(crate) mod uses;

@@ -15,6 +15,7 @@ pub struct Recording {
     pub(crate) scratch: usize,
     /// Threads per world, a power of two.
     pub(crate) lanes: usize,
+    pub(crate) assumed: Option<Operand>,
     pub(crate) body: Vec<Statement>,
 }
 
@@ -62,9 +63,42 @@ impl Recording {
         self.inputs
     }
 
+    /// The statements, in order.
+    pub fn body(&self) -> &[Statement] {
+        &self.body
+    }
+
+    /// How a value is computed.
+    pub fn value(&self, number: u32) -> Op {
+        self.values[number as usize]
+    }
+
+    /// Values are numbered below this.
+    pub fn values(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Variables, lists and indices are numbered below this.
+    pub fn names(&self) -> usize {
+        self.names
+    }
+
+    /// What each output is, in order.
+    pub fn results(&self) -> &[Operand] {
+        &self.outputs
+    }
+
     /// Number of outputs.
     pub fn outputs(&self) -> usize {
         self.outputs.len()
+    }
+
+    /// The mask that must hold in no world, if the code was recorded on assumptions ([`Recorder::assume_nowhere`]). It is
+    /// computed outside of all blocks.
+    ///
+    /// [`Recorder::assume_nowhere`]: crate::Recorder::assume_nowhere
+    pub fn assumed(&self) -> Option<Operand> {
+        self.assumed
     }
 
     /// Threads per world.
@@ -173,6 +207,7 @@ impl Recording {
     /// Calls `f` with what each statement reads, and with the outputs.
     pub(crate) fn each_operand(&self, mark: &mut impl FnMut(Operand)) {
         self.outputs.iter().for_each(|x| mark(*x));
+        self.assumed.iter().for_each(|x| mark(*x));
         self.each_statement(&mut |statement| match statement {
             Statement::Let(number) => self.values[*number as usize].each_operand(&mut *mark),
             Statement::Var { value, .. }

@@ -4,9 +4,10 @@ use sim_physics::lane::{Fixed, Table};
 
 /// What an operation reads: a constant, or a value computed before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Operand {
+pub enum Operand {
     /// Bits of an `f32`, so that it can be compared and hashed.
     Constant(u32),
+    /// A mask that is the same in all worlds.
     Truth(bool),
     /// Number of the value in [`crate::Recording::values`].
     Value(u32),
@@ -14,12 +15,12 @@ pub(crate) enum Operand {
 
 impl Operand {
     /// A constant. Negative zero becomes zero, so that equal constants are the same constant.
-    pub(crate) fn number(x: f32) -> Operand {
+    pub fn number(x: f32) -> Operand {
         Operand::Constant((x + 0.0).to_bits())
     }
 
     /// The constant that this is, if it is one.
-    pub(crate) fn constant(self) -> Option<f32> {
+    pub fn constant(self) -> Option<f32> {
         match self {
             Operand::Constant(bits) => Some(f32::from_bits(bits)),
             _ => None,
@@ -27,31 +28,48 @@ impl Operand {
     }
 }
 
+/// What is done to one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Unary {
+pub enum Unary {
+    /// `-a`
     Neg,
+    /// Square root.
     Sqrt,
+    /// Absolute value.
     Abs,
+    /// Nearest integer, ties to even.
     Round,
+    /// The mask that holds where `a` does not.
     Not,
 }
 
+/// What is done to two operands, `a` and `b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Binary {
+pub enum Binary {
+    /// `a + b`
     Add,
+    /// `a - b`
     Sub,
+    /// `a * b`
     Mul,
+    /// `a / b`
     Div,
+    /// The smaller; `b` where either is NaN.
     Min,
+    /// The larger; `b` where either is NaN.
     Max,
+    /// The mask of `a < b`, which is false where either is NaN.
     Lt,
+    /// The mask that holds where both do.
     And,
+    /// The mask that holds where one of them does.
     Or,
 }
 
 /// How a value was computed. Variables, lists, loop indices and rows share one numbering: `name`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Op {
+pub enum Op {
+    /// A scalar from outside, by its place among the inputs.
     Input(u32),
     /// A variable's value at this point.
     Get(u32),
@@ -69,7 +87,9 @@ pub(crate) enum Op {
     AcrossLanes(Operand, usize),
     /// A value that is the same in all lanes, of operations in which each had another.
     Alike(Operand),
+    /// Arithmetic on one value, or on one mask.
     Unary(Unary, Operand),
+    /// Arithmetic on two values or masks, or their comparison.
     Binary(Binary, Operand, Operand),
     /// `a * b + c`, rounded once.
     Fma(Operand, Operand, Operand),
@@ -81,13 +101,18 @@ pub(crate) enum Op {
     Constant(Entry),
     /// An entry of a table of the model, in a row that is an integer and in range.
     Pick {
+        /// Where the entry stands.
         table: Fixed,
+        /// A value: each world may have another row.
         row: Operand,
+        /// Column of the row.
         number: usize,
     },
     /// An index of an index table of the model, below `end`. The value is an index.
     Index {
+        /// Where the index stands.
         entry: Entry,
+        /// Every index of the table is below it.
         end: usize,
     },
     /// An index plus an integer. The value is an index.
@@ -100,7 +125,7 @@ pub(crate) enum Op {
 
 impl Op {
     /// Calls `f` with every operand.
-    pub(crate) fn each_operand(&self, mut f: impl FnMut(Operand)) {
+    pub fn each_operand(&self, mut f: impl FnMut(Operand)) {
         match *self {
             Op::Input(_) | Op::Get(_) | Op::Count(_) | Op::Lane => {}
             Op::Load(cell) => cell.row.each_operand(f),
@@ -131,7 +156,7 @@ impl Op {
     }
 
     /// Is it written where it is used, instead of in a statement of its own?
-    pub(crate) fn is_inline(&self) -> bool {
+    pub fn is_inline(&self) -> bool {
         matches!(
             self,
             Op::Unary(Unary::Neg | Unary::Not, _) | Op::Input(_) | Op::Part(..) | Op::Alike(_)
@@ -141,7 +166,8 @@ impl Op {
 
 /// An index: of a row of a table, or of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Row {
+pub enum Row {
+    /// An index that is known when the code is recorded.
     At(usize),
     /// The index of an open loop, or the fresh row of an open push.
     Name(u32),
@@ -151,7 +177,7 @@ pub(crate) enum Row {
 
 impl Row {
     /// Calls `f` with the value that it is, if it is one.
-    pub(crate) fn each_operand(self, mut f: impl FnMut(Operand)) {
+    pub fn each_operand(self, mut f: impl FnMut(Operand)) {
         if let Row::Value(number) = self {
             f(Operand::Value(number));
         }
@@ -160,80 +186,130 @@ impl Row {
 
 /// Column `number` of a row of a table of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Entry {
+pub struct Entry {
+    /// Rows of the model, which no program changes.
     pub table: Fixed,
+    /// Which row.
     pub row: Row,
+    /// Column of the row.
     pub number: usize,
 }
 
 /// Column `number` of a row of a table in scratch memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Cell {
+pub struct Cell {
+    /// Rows of a world, which stages read and write.
     pub table: Table,
+    /// In a push, each world may have another row.
     pub row: Row,
+    /// Column of the row.
     pub number: usize,
 }
 
 /// Four neighbouring scalars in scratch memory: vector `row * stride + first`, counted in vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Quad {
+pub struct Quad {
+    /// Row of a table whose rows are whole vectors.
     pub row: Row,
+    /// Vectors from a row to the next.
     pub stride: usize,
+    /// The vector in row 0, counted from the beginning of scratch memory.
     pub first: usize,
 }
 
 /// Which bounds a loop runs, at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Bounds {
+pub enum Bounds {
     /// From the first index to before the end.
-    Span { first: Row, end: Row },
+    Span {
+        /// Index of the first iteration.
+        first: Row,
+        /// Indices are below it.
+        end: Row,
+    },
     /// The rows that a list holds when the loop starts.
-    Rows { list: u32, capacity: usize },
+    Rows {
+        /// Name of the list.
+        list: u32,
+        /// Rows that fit into it; what is pushed beyond is counted, not kept.
+        capacity: usize,
+    },
     /// As `Span`, shared among the lanes of a world.
-    Shared { first: Row, end: Row },
+    Shared {
+        /// Index of the first iteration of lane 0.
+        first: Row,
+        /// Indices are below it.
+        end: Row,
+    },
 }
 
+/// What is done, in order. In a block, it is done where the world is active.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Statement {
+pub enum Statement {
     /// Computes a value.
     Let(u32),
+    /// A variable begins.
     Var {
+        /// Its number.
         name: u32,
+        /// What it begins with.
         value: Operand,
     },
+    /// A variable that has begun changes.
     Set {
+        /// Its number.
         name: u32,
+        /// What it holds from now on.
         value: Operand,
     },
+    /// Writes to scratch memory.
     Store {
+        /// Where.
         cell: Cell,
+        /// What.
         value: Operand,
     },
     /// Writes the given components of a vector.
     StoreQuad {
+        /// Where.
         quad: Quad,
+        /// What, by component; none keeps what is there.
         numbers: [Option<Operand>; 4],
     },
     /// A list of so many rows: none, unless it goes on from another program.
     List {
+        /// Its number.
         name: u32,
+        /// How many it has at first.
         rows: Operand,
     },
+    /// A block that runs where its mask holds.
     When {
+        /// Is the world active in it?
         mask: Operand,
+        /// Its statements.
         body: Vec<Statement>,
     },
     /// Counts a row where the mask holds; the body runs where the row fits.
     Push {
+        /// Name of the list.
         list: u32,
+        /// Rows that fit into it.
         capacity: usize,
+        /// Name of the fresh row's index, for the body.
         row: u32,
+        /// Does the world push?
         mask: Operand,
+        /// Statements that write the row.
         body: Vec<Statement>,
     },
+    /// Iterations, one for each index, until the world leaves.
     Loop {
+        /// Name of the index, for the body.
         index: u32,
+        /// Its indices.
         bounds: Bounds,
+        /// Statements of an iteration.
         body: Vec<Statement>,
     },
     /// Leaves the innermost loop where the mask holds.

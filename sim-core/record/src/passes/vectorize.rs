@@ -23,6 +23,7 @@ impl Recording {
             names: self.names,
             scratch: self.scratch,
             lanes: self.lanes,
+            assumed: self.assumed,
             body,
         }
     }

@@ -7,6 +7,7 @@ mod known_values;
 mod lists;
 mod loops;
 mod memory;
+mod options;
 mod scalar;
 pub(crate) mod state;
 
@@ -31,20 +32,6 @@ impl Recorder {
         Recorder {
             thread: PhantomData,
         }
-    }
-
-    /// Has so many threads share the work of a world, a power of two up to 32. Call it before
-    /// code that asks for its lanes.
-    ///
-    /// # Panics
-    /// If it is another number.
-    #[track_caller]
-    pub fn set_lanes(&mut self, lanes: usize) {
-        assert!(
-            lanes.is_power_of_two() && lanes <= 32,
-            "lanes are added in pairs"
-        );
-        with(Location::caller(), |s| s.lanes = lanes);
     }
 }
 
@@ -96,6 +83,21 @@ impl Cx for Recorder {
                 s.assign(v.name, value);
             }
         });
+    }
+
+    #[track_caller]
+    fn anywhere(&mut self, mask: RecordedMask) -> bool {
+        with(Location::caller(), |s| {
+            if !s.assumes || s.kind_here() != Kind::Whole {
+                return true;
+            }
+            let mask = s.see(mask.0);
+            s.assumed = Some(match s.assumed {
+                Some(before) => s.or(before, mask),
+                None => mask,
+            });
+            false
+        })
     }
 
     #[track_caller]

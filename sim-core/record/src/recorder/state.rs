@@ -57,6 +57,10 @@ pub(crate) struct State {
     recording: u32,
     /// Threads per world.
     pub lanes: usize,
+    /// Is what the code asks about some world taken to hold in none?
+    pub assumes: bool,
+    /// The mask that must hold nowhere, so far.
+    pub assumed: Option<Operand>,
     pub values: Vec<Value>,
     names: u32,
     pub open: Vec<Scope>,
@@ -83,6 +87,8 @@ impl Session {
         let mut state = State {
             recording: RECORDINGS.fetch_add(1, Ordering::Relaxed),
             lanes: 1,
+            assumes: false,
+            assumed: None,
             values: Vec::new(),
             names: 0,
             open: Vec::new(),

@@ -279,6 +279,7 @@ fn kernel(plan: &Plan<'_>, p: usize, options: &ProgramOptions) -> Kernel {
         names: plan.recording.names,
         scratch: 0,
         lanes: 1,
+        assumed: None,
         body: writer.body,
     };
     let mut recording = Recording {

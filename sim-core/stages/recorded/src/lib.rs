@@ -3,10 +3,11 @@
 //! Its instance of the physics is a hundred thousand calls, which no optimisation makes faster in a way that matters: a
 //! recording takes milliseconds. See the profile in `Cargo.toml`.
 
-use sim_physics::arrays::{Array, Block, Flat};
+use sim_physics::arrays::{Array, Block, Flat, Writer};
 use sim_physics::constants::Constants;
 use sim_physics::every_stage;
 use sim_physics::lane::{Cx, Num};
+use sim_physics::schedule::step_stages;
 use sim_physics::step::{Stage, StageId};
 use sim_record::{RecordError, Recorded, RecordedVariable, Recorder, Recording, record};
 
@@ -23,6 +24,70 @@ type RunStage = fn(&mut Recorder, &Constants<f32>, &mut RecordedWorlds);
 
 fn recorded<S: Stage>(cx: &mut Recorder, m: &Constants<f32>, block: &mut RecordedWorlds) {
     S::run(cx, m, block);
+}
+
+/// A recorded substep, with the arrays of its inputs and of its outputs, in order.
+pub struct Substep {
+    /// All stages.
+    pub recording: Recording,
+    /// What its inputs are.
+    pub reads: Vec<Array>,
+    /// What its outputs are: what outlasts a substep.
+    pub writes: Vec<Array>,
+}
+
+impl Substep {
+    /// Records the substep of a model; on assumptions, see [`Recorder::assume_nowhere`].
+    ///
+    /// # Errors
+    /// As [`record`].
+    pub fn record(m: &Constants<f32>, assumes: bool) -> Result<Substep, RecordError> {
+        let stages = step_stages(m);
+        let (mut reads, _) = effects(&stages);
+        let writes = kept();
+        // what is not written keeps its value
+        let kept = writes.iter().filter(|array| !reads.contains(array));
+        let kept: Vec<Array> = kept.copied().collect();
+        reads.extend(kept);
+        let recording = between(m, &reads, &writes, |cx, block| {
+            if assumes {
+                cx.assume_nowhere();
+            }
+            for stage in stages {
+                run(stage, cx, m, block);
+            }
+            Vec::new()
+        })?;
+        Ok(Substep {
+            recording,
+            reads,
+            writes,
+        })
+    }
+}
+
+/// What outlasts a substep.
+pub fn kept() -> Vec<Array> {
+    let kept = |array: &Array| matches!(array.writer(), Writer::Motion | Writer::Counter);
+    Array::ALL.iter().copied().filter(kept).collect()
+}
+
+/// What a run of stages reads from before it, and what it writes.
+pub fn effects(stages: &[StageId]) -> (Vec<Array>, Vec<Array>) {
+    let (mut reads, mut writes) = (Vec::new(), Vec::new());
+    for stage in stages {
+        for array in stage.row().reads {
+            if !writes.contains(array) && !reads.contains(array) {
+                reads.push(*array);
+            }
+        }
+        for array in stage.row().writes {
+            if !writes.contains(array) {
+                writes.push(*array);
+            }
+        }
+    }
+    (reads, writes)
 }
 
 /// The recording of `code` between two sets of arrays: its inputs are the scalars of `reads`, in order, its outputs those of

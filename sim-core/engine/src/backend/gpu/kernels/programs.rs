@@ -2,7 +2,7 @@
 
 use super::places::Places;
 use crate::backend::gather::gather;
-use sim_physics::arrays::{Array, Field, Writer};
+use sim_physics::arrays::{Array, Field};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Num;
 use sim_physics::schedule::step_stages;
@@ -11,13 +11,7 @@ use sim_physics::times;
 use sim_record::split::{Kernel, Limits, Part, Split, split};
 use sim_record::wgsl::{Exchange, ProgramOptions};
 use sim_record::{RecordError, Recorded, Recording};
-use stages_recorded::{between, run};
-
-/// What outlasts a substep.
-fn kept() -> Vec<Array> {
-    let kept = |array: &Array| matches!(array.writer(), Writer::Motion | Writer::Counter);
-    Array::ALL.iter().copied().filter(kept).collect()
-}
+use stages_recorded::{between, effects, kept, run};
 
 /// How kernels are made.
 #[derive(Clone, Copy)]
@@ -166,24 +160,6 @@ fn with_joined(order: Vec<Part>, joined: Part, times: usize) -> Vec<Part> {
     parts.push(repeated(times - 1, again.collect()));
     parts.push(last.clone());
     parts
-}
-
-/// What a run of stages reads from before it, and what it writes.
-fn effects(stages: &[StageId]) -> (Vec<Array>, Vec<Array>) {
-    let (mut reads, mut writes) = (Vec::new(), Vec::new());
-    for stage in stages {
-        for array in stage.row().reads {
-            if !writes.contains(array) && !reads.contains(array) {
-                reads.push(*array);
-            }
-        }
-        for array in stage.row().writes {
-            if !writes.contains(array) {
-                writes.push(*array);
-            }
-        }
-    }
-    (reads, writes)
 }
 
 /// Substeps, one after another.

@@ -1,0 +1,30 @@
+//! Options of a recording.
+
+use crate::recorder::Recorder;
+use crate::recorder::state::with;
+use std::panic::Location;
+
+impl Recorder {
+    /// Has so many threads share the work of a world, a power of two up to 32. Call it before
+    /// code that asks for its lanes.
+    ///
+    /// # Panics
+    /// If it is another number.
+    #[track_caller]
+    pub fn set_lanes(&mut self, lanes: usize) {
+        assert!(
+            lanes.is_power_of_two() && lanes <= 32,
+            "lanes are added in pairs"
+        );
+        with(Location::caller(), |s| s.lanes = lanes);
+    }
+
+    /// From now on, whatever the code asks about outside of blocks and loops ([`Cx::anywhere`]) holds in no world: the
+    /// recording is good where [`Recording::assumed`] holds nowhere.
+    ///
+    /// [`Recording::assumed`]: crate::Recording::assumed
+    #[track_caller]
+    pub fn assume_nowhere(&mut self) {
+        with(Location::caller(), |s| s.assumes = true);
+    }
+}
