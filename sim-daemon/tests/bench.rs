@@ -1,5 +1,7 @@
 //! `tightloop bench`: what it measures, and which arguments it refuses.
 
+use sim_engine::backend::cpu;
+use sim_engine::simulation::Lanes;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
@@ -25,13 +27,18 @@ const QUICK: [&str; 3] = ["--worlds=11", "--settle=0.1", "--seconds=0.05"];
 
 /// Runs `tightloop bench` on a box that stands on the ground.
 fn bench(name: &str, arguments: &[&str]) -> Output {
+    bench_of(SCENE, name, arguments)
+}
+
+/// Runs `tightloop bench` on a scene.
+fn bench_of(scene: &str, name: &str, arguments: &[&str]) -> Output {
     let is_given = |short: &str| {
         let (name, _) = short.split_once('=').expect("a value");
         arguments.iter().any(|given| given.starts_with(name))
     };
     let folder: PathBuf = std::env::temp_dir().join(format!("bench-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("scene.toml"), SCENE).unwrap();
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
     std::fs::write(folder.join("box.urdf"), BOX).unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_tightloop"))
         .args(["bench", "scene.toml"])
@@ -105,6 +112,37 @@ fn people_get_a_table() {
     ] {
         assert!(said.contains(word), "{word} in {said}");
     }
+}
+
+#[test]
+fn machine_code_is_reported_where_it_runs() {
+    let (falling, _) = SCENE.split_once("[[shape]]").unwrap();
+    let code = |scene, name, arguments: &[&str]| {
+        let done = bench_of(scene, name, &[&["--json"], arguments].concat());
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert!(
+            report["stages"].as_array().unwrap().len() > 3,
+            "stages are profiled"
+        );
+        report["machine_code"].clone()
+    };
+    // on other processors the stages run
+    let is_here = cfg!(target_arch = "x86_64") && cpu::available(Lanes::Eight);
+    let made = code(falling, "code", &[]);
+    assert_eq!(made.is_array(), is_here, "{made}");
+    assert!(
+        !is_here || made[0]["instructions"].as_u64().unwrap() > 100,
+        "{made}"
+    );
+    assert!(code(falling, "code-stages", &["--stages"]).is_null());
+    assert!(code(SCENE, "code-contacts", &[]).is_null());
+    let table = text(&bench_of(falling, "code-table", &[]).stdout);
+    assert_eq!(
+        table.contains("machine code of a substep"),
+        is_here,
+        "{table}"
+    );
 }
 
 #[test]

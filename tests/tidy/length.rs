@@ -65,6 +65,7 @@ fn lengths() -> Vec<(String, usize)> {
         "sim-core/model/tests",
         "sim-core/record/src",
         "sim-core/record/tests",
+        "sim-core/compile/tests",
         "sim-core/engine/tests",
         "sim-core/device/benches",
         "sim-core/device/tests",

@@ -76,6 +76,7 @@ fn sources() -> Vec<String> {
     [
         "sim-core/physics/src",
         "sim-core/model/src",
+        "sim-core/compile/src",
         "sim-core/device/src",
         "sim-core/engine/src",
         "sim-core/ik/src",
@@ -141,6 +142,16 @@ fn crates_know_only_what_they_may() {
         (
             "sim-core/model/src",
             &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+        ),
+        (
+            "sim-core/compile/src",
+            &[
+                "sim_model",
+                "sim_device",
+                "sim_engine",
+                "sim_protocol",
+                "sim_daemon",
+            ],
         ),
         (
             "sim-core/device/src",

@@ -81,6 +81,17 @@ pub const ORDER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "sim-core/compile/src",
+        &[
+            "address", "error", "code", "machine", "lower", "allocate", "x86", "pages",
+        ],
+    ),
+    (
+        "sim-core/compile/src/allocate",
+        &["registers", "slots", "uses"],
+    ),
+    ("sim-core/compile/src/x86", &["assembler", "avx2", "avx512"]),
+    (
         "sim-core/model/src",
         &[
             "joint_kind",
@@ -138,6 +149,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "space",
             "lane_move",
             "gathered",
+            "compiled",
             "chunk",
             "delay",
             "faults",

@@ -70,6 +70,9 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Worlds per block.
     pub lanes: Lanes,
+    /// Whether the processor runs a model as machine code of its own where that can be made, instead of stages that were compiled
+    /// for all models: faster, with the same bits.
+    pub compiles: bool,
     /// Fields of a frame; counters come with every frame.
     pub fields: Vec<Field>,
     /// Which state the evaluated outputs of a step belong to.
@@ -94,6 +97,7 @@ impl Default for Options {
             precision: Precision::F32,
             threads: None,
             lanes: Lanes::Auto,
+            compiles: true,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
             outputs_at: OutputsAt::Frame,
             faults: Faults::default(),
@@ -162,7 +166,14 @@ pub(crate) fn backends(
     let on_cpu = || {
         let layout = (layout, options.outputs_at);
         let threads = threads_of(options);
-        cpu::create(model, groups, precision, options.lanes, layout, threads)
+        cpu::create(
+            model,
+            groups,
+            precision,
+            options.lanes,
+            layout,
+            (threads, options.compiles),
+        )
     };
     let lags = options.outputs_at == OutputsAt::LastSubstep;
     let note = match &options.device {

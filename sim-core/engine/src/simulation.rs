@@ -1,8 +1,8 @@
 //! Many worlds of one model: reset, write, step, read.
 
 pub use crate::backend::{
-    Faults, FirstFrozen, Frozen, Histogram, LaneWork, Lanes, OutputsAt, Part, Precision, Profile,
-    ProgramInfo, StageProfile,
+    Faults, FirstFrozen, Frozen, Histogram, LaneWork, Lanes, MachineCode, OutputsAt, Part,
+    Precision, Profile, ProgramInfo, StageProfile,
 };
 pub use crate::options::{AUTO_WORLDS, Device, Options};
 pub use crate::random::Draws;
@@ -115,6 +115,11 @@ impl Simulation {
     /// Name of the processor or GPU, for people.
     pub fn device(&self) -> &str {
         self.backend.device()
+    }
+    /// Sizes of the machine code of a substep, without rare cases and with them; none where the stages run that were compiled for
+    /// all models.
+    pub fn compiled(&self) -> Option<[MachineCode; 2]> {
+        self.backend.compiled()
     }
     /// Why [`Device::Auto`] chose this device, for people.
     pub fn device_note(&self) -> Option<&str> {

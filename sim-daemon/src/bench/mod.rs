@@ -6,7 +6,7 @@ mod report;
 use std::time::{Duration, Instant};
 
 use sim_engine::backend::{Values, cpu};
-use sim_engine::simulation::{Lanes, Options, Precision, Profile, Simulation};
+use sim_engine::simulation::{Lanes, MachineCode, Options, Precision, Profile, Simulation};
 use sim_model::{KeyState, Model};
 use sim_physics::arrays::Field;
 
@@ -28,6 +28,8 @@ struct Measured {
     /// Steps of a world per second, of each turn, least first.
     rates: Vec<f64>,
     profile: Profile,
+    /// Machine code of a substep, without rare cases and with them, if that ran.
+    compiled: Option<[MachineCode; 2]>,
     /// Worlds that have faulted, and whose solver used up its iterations in the last frame.
     faulted: usize,
     unconverged: usize,
@@ -100,6 +102,7 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
         device: simulation.device().to_owned(),
         worlds: options.worlds,
         threads: simulation.threads(),
+        compiled: simulation.compiled(),
         command: commands
             .as_ref()
             .filter(|_| swing > 0.0)
@@ -167,6 +170,7 @@ fn check(args: &Bench) -> Result<Options, DaemonError> {
         worlds: args.worlds,
         threads: Some(args.threads),
         lanes,
+        compiles: !args.stages,
         precision,
         fields: vec![Field::JointQ, Field::JointQd],
         ..Options::default()

@@ -1,7 +1,7 @@
 //! What a benchmark prints.
 
 use serde_json::{Value, json};
-use sim_engine::simulation::{Histogram, LaneWork, Part};
+use sim_engine::simulation::{Histogram, LaneWork, MachineCode, Part};
 
 use super::Measured;
 use crate::error::DaemonError;
@@ -63,12 +63,25 @@ fn text(measured: &Measured) -> String {
             "worlds faulted: {}, not converged in the last frame: {}",
             measured.faulted, measured.unconverged
         ),
+    ];
+    if let Some([usual, full]) = measured.compiled {
+        let size = |code: MachineCode| {
+            let kilobytes = code.bytes as f64 / 1e3;
+            format!("{kilobytes:.0} kB, {} instructions", code.instructions)
+        };
+        lines.push(format!("machine code of a substep: {}", size(usual)));
+        if usual.bytes != full.bytes {
+            lines.push(format!("  where a joint is at a limit: {}", size(full)));
+        }
+        lines.push("times below are of the stages that it stands for".to_owned());
+    }
+    lines.extend([
         String::new(),
         format!(
             "{:<28}{:>9}{:>7}{:>9}",
             "a world and step", "mean", "99 %", "largest"
         ),
-    ];
+    ]);
     for (name, of) in counts(measured) {
         if !of.is_empty() {
             let (mean, most, all) = (of.mean(), of.quantile(0.99), of.max());
@@ -171,6 +184,11 @@ fn json_of(measured: &Measured) -> Value {
         "device": measured.device,
         "worlds": measured.worlds,
         "threads": measured.threads,
+        "machine_code": measured.compiled.map(|programs| programs.map(|code| json!({
+            "bytes": code.bytes,
+            "instructions": code.instructions,
+            "spills": code.spills,
+        }))),
         "commands": measured.command,
         "steps_per_s": measured.rates[measured.rates.len() / 2],
         "steps_per_s_turns": measured.rates,

@@ -314,6 +314,10 @@ pub(crate) struct Bench {
     #[arg(long, default_value = "f32")]
     pub(crate) precision: String,
 
+    /// Measure the stages that were compiled for all models, also where the model is compiled to machine code of its own.
+    #[arg(long)]
+    pub(crate) stages: bool,
+
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,

@@ -33,6 +33,8 @@ impl Evaluation {
             precision,
             threads: Some(1),
             fields: fields.to_vec(),
+            // it never steps
+            compiles: false,
             ..Options::default()
         };
         let simulation = Simulation::new(model, &options)?;

@@ -16,6 +16,7 @@ pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 pub use input::{Input, Values};
 pub use profile::{Histogram, LaneWork, Part, Profile, StageProfile};
+pub use sim_compile::Size as MachineCode;
 pub use sim_device::HostPages;
 
 use crate::random::Numbering;
@@ -157,6 +158,10 @@ pub trait Backend: Send {
     /// The programs of a GPU; none on the CPU.
     fn programs(&self) -> &[ProgramInfo] {
         &[]
+    }
+    /// Sizes of the machine code of a substep, without rare cases and with them; none where stages run, and on a GPU.
+    fn compiled(&self) -> Option<[MachineCode; 2]> {
+        None
     }
     /// What each command of the first tile's last frame took on the device [s]; empty where they are not timed, and on the CPU.
     fn seconds(&self) -> Vec<(&str, f64)> {

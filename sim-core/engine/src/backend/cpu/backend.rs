@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer;
-use crate::backend::{Backend, BackendError, Faults, Frozen, Input, Profile, Values};
+use crate::backend::{Backend, BackendError, Faults, Frozen, Input, MachineCode, Profile, Values};
 use rayon::prelude::*;
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
@@ -75,7 +75,7 @@ impl<F: Lane> Cpu<F> {
         worlds: usize,
         threads: usize,
         workers: Workers,
-        compiled: &CompiledStages<F>,
+        (stages, note): (&CompiledStages<F>, &str),
     ) -> Self {
         let blocks = worlds.div_ceil(F::WIDTH);
         let parts = if threads == 1 {
@@ -98,12 +98,12 @@ impl<F: Lane> Cpu<F> {
             workers,
             threads,
             device: format!(
-                "cpu ({}, {} world{} a block, {threads} thread{plural})",
-                compiled.instructions,
+                "cpu ({}, {} world{} a block{note}, {threads} thread{plural})",
+                stages.instructions,
                 F::WIDTH,
                 if F::WIDTH == 1 { "" } else { "s" },
             ),
-            run: compiled.chunk,
+            run: stages.chunk,
         }
     }
 }
@@ -135,6 +135,10 @@ impl<F: Lane> Backend for Cpu<F> {
 
     fn threads(&self) -> usize {
         self.threads
+    }
+
+    fn compiled(&self) -> Option<[MachineCode; 2]> {
+        Some(self.job.compiled.as_ref()?.sizes())
     }
 
     fn set_faults(&mut self, faults: Faults) {

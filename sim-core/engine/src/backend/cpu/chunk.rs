@@ -1,5 +1,6 @@
 //! A chunk: blocks of worlds that one thread works on, with their state in lane order and a workspace for each block of a cluster.
 
+use super::compiled::CompiledStep;
 use super::contact_kinds::ContactKinds;
 use super::gathered::{Gathering, cluster_size};
 use super::lane_assignment::LaneAssignment;
@@ -17,6 +18,7 @@ use sim_physics::lane::{Lane, Real};
 use sim_physics::schedule::{evaluation_stages, step_stages};
 use sim_physics::step::{Runs, StageId};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A stage that may pause.
 #[derive(Clone, Copy)]
@@ -37,6 +39,8 @@ pub(super) struct Job<F: Lane> {
     pub layout: Layout,
     /// Stages of a step that the model needs, by their places.
     pub step: Vec<usize>,
+    /// The substep as machine code, where the model is compiled.
+    pub compiled: Option<Arc<CompiledStep>>,
     /// Stages that evaluate the fields of the layout.
     pub evaluate: Vec<usize>,
     /// Stages that evaluate fields of the state in the frame after a step.
@@ -68,6 +72,7 @@ impl<F: Lane> Job<F> {
         model: &Model,
         (layout, outputs_at): (Layout, OutputsAt),
         stages: Stages<F>,
+        compiled: Option<Arc<CompiledStep>>,
         numbering: Numbering,
     ) -> Job<F> {
         let constants = model.constants().cast();
@@ -95,6 +100,7 @@ impl<F: Lane> Job<F> {
                 resumes: stage.resumes(),
             }),
             step: places(&step),
+            compiled,
             evaluate: places(&evaluation),
             evaluate_now,
             evaluate_last,
@@ -142,6 +148,10 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) spaces: Vec<Option<Space<F>>>,
     /// The place of the block at work in its cluster.
     pub(super) at_work: usize,
+    /// For how many substeps each block assumes nothing, see [`CompiledStep::run`].
+    pub(super) wary: Vec<u8>,
+    /// Memory of the compiled substep.
+    pub(super) compiled_scratch: Vec<F>,
     /// Blocks of worlds from the cluster; none where blocks are by themselves.
     pub(super) gathering: Option<Gathering<F>>,
     /// Scratch: what an evaluation amid a step must leave as it was.
@@ -164,8 +174,11 @@ impl<F: Lane> Chunk<F> {
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
         let cluster = match job.pauses {
-            Some(_) => cluster_size(&job.constants, blocks, size_of::<F>()),
-            None => 1,
+            // a compiled substep does not pause
+            Some(_) if job.compiled.is_none() => {
+                cluster_size(&job.constants, blocks, size_of::<F>())
+            }
+            _ => 1,
         };
         let Space { block, memory } = Space::new(&job.constants);
         let mut spaces = vec![None];
@@ -183,6 +196,8 @@ impl<F: Lane> Chunk<F> {
             memory,
             spaces,
             at_work: 0,
+            wary: vec![0; blocks],
+            compiled_scratch: vec![F::default(); job.compiled.as_ref().map_or(0, |c| c.scratch())],
             gathering: (cluster > 1).then(|| Gathering::new(&job.constants)),
             kept: vec![F::default(); job.constants.dofs.len()],
             staging: vec![F::default(); elements],
@@ -320,6 +335,19 @@ impl<F: Lane> Chunk<F> {
         b.left_out[0] = F::c(0.0);
         b.substep[0] = F::c(0.0);
         b.command_noise.fill(F::c(0.0));
+    }
+
+    /// Makes each zero in the state of the block at work positive: stages and machine code may differ in its sign, and in no
+    /// other number.
+    #[inline(always)]
+    pub(super) fn make_zeros_positive(&mut self) {
+        for array in RECORD.into_iter().filter(state::is_motion) {
+            let (Flat::Cells(x) | Flat::Values(x)) = self.block.array_mut(array);
+            for x in x {
+                // -0 + 0 is 0
+                *x = *x + F::c(0.0);
+            }
+        }
     }
 
     /// The state of a block out of its workspace; commands did not change.

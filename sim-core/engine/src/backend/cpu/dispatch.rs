@@ -2,6 +2,7 @@
 
 use super::backend::{CompiledStages, Cpu, Workers};
 use super::chunk::{Chunk, Job};
+use super::compiled::CompiledStep;
 use super::transfer::Arena;
 use crate::backend::{
     Backend, BackendError, Backends, Groups, Lanes, OutputsAt, Precision, Profile,
@@ -11,6 +12,7 @@ use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
 use sim_physics::lane::simd::{EIGHT, widths};
+use std::sync::Arc;
 
 macro_rules! compiled {
     ($(#[$attribute:meta])* $name:ident) => {
@@ -52,8 +54,9 @@ pub fn create(
     precision: Precision,
     lanes: Lanes,
     layout: (&Layout, OutputsAt),
-    threads: usize,
+    (threads, compiles): (usize, bool),
 ) -> Result<Backends, BackendError> {
+    let threads = (threads, compiles);
     let lanes = match lanes {
         // one world in a SIMD register is slower than a scalar, with the same bits
         Lanes::Auto if groups.worlds == 1 => Lanes::Scalar,
@@ -112,9 +115,21 @@ fn boxed<F: Lane>(
     model: &Model,
     groups: Groups,
     (layout, outputs_at): (&Layout, OutputsAt),
-    threads: usize,
-    compiled: CompiledStages<F>,
+    (threads, compiles): (usize, bool),
+    stages: CompiledStages<F>,
 ) -> Result<Backends, BackendError> {
+    // a substep whose stages are shown runs as stages
+    let shows_all = outputs_at == OutputsAt::LastSubstep && model.substeps() == 1;
+    let compiled = match compiles && !shows_all {
+        true => CompiledStep::of_model::<F>(model),
+        false => Ok(None),
+    };
+    let note = match &compiled {
+        Ok(Some(_)) => ", machine code".to_owned(),
+        Ok(None) => String::new(),
+        Err(error) => format!(", stages only: {error}"),
+    };
+    let compiled = compiled.ok().flatten().map(Arc::new);
     // one thread per block is enough
     let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
     let workers = Workers::new(threads, groups.count)?;
@@ -122,10 +137,17 @@ fn boxed<F: Lane>(
         let job = Job::new(
             model,
             (layout.clone(), outputs_at),
-            compiled.stages,
+            stages.stages,
+            compiled.clone(),
             numbering,
         );
-        let cpu = Cpu::new(job, groups.worlds, threads, workers.clone(), &compiled);
+        let cpu = Cpu::new(
+            job,
+            groups.worlds,
+            threads,
+            workers.clone(),
+            (&stages, &note),
+        );
         Box::new(cpu) as Box<dyn Backend>
     });
     Ok(made.collect())

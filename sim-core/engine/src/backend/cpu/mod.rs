@@ -15,6 +15,7 @@
 
 mod backend;
 mod chunk;
+mod compiled;
 mod contact_kinds;
 mod contacts;
 mod delay;

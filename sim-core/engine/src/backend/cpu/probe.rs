@@ -23,6 +23,8 @@ pub(super) struct Moment<'a, F: Lane> {
 
 /// What watches a chunk run. `()` watches nothing, and costs nothing.
 pub(super) trait Probe<F: Lane> {
+    /// Does it watch stages?
+    const WATCHES: bool = true;
     /// Before a stage.
     fn before(&mut self, _moment: &mut Moment<'_, F>) {}
     /// After it.
@@ -33,7 +35,9 @@ pub(super) trait Probe<F: Lane> {
     fn note_moves(&mut self, _worlds: usize) {}
 }
 
-impl<F: Lane> Probe<F> for () {}
+impl<F: Lane> Probe<F> for () {
+    const WATCHES: bool = false;
+}
 
 /// Fills a [`Profile`].
 pub(super) struct Watch<'a, F> {

@@ -135,18 +135,35 @@ impl<F: Lane> Chunk<F> {
         block * stride..(block + 1) * stride
     }
 
-    /// Runs a substep of a cluster of blocks; of the last one it writes the fields that belong to it to the arena.
+    /// Runs a substep of a cluster of blocks: as machine code, unless its stages are watched or evaluated. Of the last one it writes
+    /// the fields that belong to it to the arena.
     ///
     /// # Safety
     /// As [`Chunk::run`].
     #[inline(always)]
-    unsafe fn step(
+    unsafe fn step<P: Probe<F>>(
         &mut self,
         job: &Job<F>,
         blocks: Range<usize>,
         last: Option<Arena>,
-        probe: &mut impl Probe<F>,
+        probe: &mut P,
     ) {
+        let shows = last.is_some() && job.evaluate_last.is_some();
+        if let (false, false, Some(compiled)) = (P::WATCHES, shows, &job.compiled) {
+            for (k, block) in blocks.enumerate() {
+                self.enter(k);
+                let (scratch, wary) = (&mut self.compiled_scratch, &mut self.wary[block]);
+                // SAFETY: by contract; it was compiled for registers of `F` and the model of the job.
+                unsafe { compiled.run(&mut self.block, scratch, wary) };
+            }
+            return;
+        }
+        if shows {
+            for k in 0..blocks.len() {
+                self.enter(k);
+                self.make_zeros_positive();
+            }
+        }
         let stages = &job.step;
         let solver = job.pauses.filter(|_| self.gathering.is_some());
         let mut begin = 0;
@@ -207,6 +224,7 @@ impl<F: Lane> Chunk<F> {
     ) {
         let state = self.state_of(job, block);
         if substeps > 0 {
+            self.make_zeros_positive();
             self.note_faults(job, block, state.clone());
             self.age_commands(job, block, state.clone());
             // outputs are a function of the state: the noise of the next frame is not drawn yet
