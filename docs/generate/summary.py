@@ -32,8 +32,6 @@ first two from an Intel Xeon, the rest from an AMD EPYC.
 
 - **Precision differs.** MuJoCo computes in float64, one world at a time. tightloop computes in float32, with 16 worlds
   in one AVX-512 register.
-- **The arm has no meshes.** In its rows with contacts beside `rollout`, its links are boxes, cylinders and spheres.
-  [Its section](#arm-with-contacts-beside-mujoco-c-on-one-thread) names results with the published meshes.
 - **Hulls differ only for URDF.** MuJoCo keeps all vertices of a mesh's convex hull. tightloop keeps at most 64 of a
   URDF's mesh, and all of a MuJoCo model's.
 - **EnvPool's scene is lighter.** Of its arm, only the hand and the fingers collide. Its solver stops after 5
