@@ -7,7 +7,7 @@ mod common;
 use common::any_program::{Scope, any_program};
 use common::any_scene::any_scene;
 use common::dice::{Dice, for_seeds};
-use common::program::play;
+use common::program::{Op, play};
 use common::{Demo, Run, lesson, noise};
 use sim_engine::backend::{OutputsAt, Values, cpu};
 use sim_engine::simulation::{Lanes, Options};
@@ -50,10 +50,8 @@ fn options(lanes: Lanes, compiles: bool) -> Options {
     }
 }
 
-/// A scene as chance has it, of shapes that do not touch.
-fn untouching(dice: &mut Dice) -> Description {
-    let is_drawn = dice.chance(0.4);
-    let mut scene = any_scene(dice, is_drawn);
+/// No pair of shapes may touch.
+fn keep_apart(scene: &mut Description) {
     let names = scene.shape_names();
     for (k, first) in names.iter().enumerate() {
         let pairs = names[k + 1..].iter();
@@ -61,6 +59,25 @@ fn untouching(dice: &mut Dice) -> Description {
             .filters
             .extend(pairs.map(|second| [first.clone(), second.clone()]));
     }
+}
+
+/// Whatever happens to all worlds.
+fn program(dice: &mut Dice, model: &Model, frames: usize) -> Vec<Op> {
+    let scope = Scope {
+        model,
+        worlds: vec![true; WORLDS],
+        sources: (0..WORLDS).collect(),
+        first_kept: 0,
+        huge: None,
+    };
+    any_program(dice, &scope, frames)
+}
+
+/// A scene as chance has it, of shapes that do not touch.
+fn untouching(dice: &mut Dice) -> Description {
+    let is_drawn = dice.chance(0.4);
+    let mut scene = any_scene(dice, is_drawn);
+    keep_apart(&mut scene);
     for robot in &mut scene.robots {
         robot.self_collisions = false;
     }
@@ -74,14 +91,7 @@ fn random_scenes_have_the_bits_of_the_stages() {
         let mut dice = Dice::new(seed);
         let scene = untouching(&mut dice);
         let model = scene.compile().map_err(|e| e.to_string())?;
-        let scope = Scope {
-            model: &model,
-            worlds: vec![true; WORLDS],
-            sources: (0..WORLDS).collect(),
-            first_kept: 0,
-            huge: None,
-        };
-        let ops = any_program(&mut dice, &scope, 8);
+        let ops = program(&mut dice, &model, 8);
         for lanes in widths() {
             let options = |compiles| Options {
                 threads: Some(1 + seed % 2),
@@ -115,13 +125,7 @@ fn models_of_mujoco_have_the_bits_of_the_stages() {
         let folder = common::repo("sim-core/stages/recorded/tests/record_stages");
         let path = folder.join(name).with_extension("safetensors");
         let mut scene = Description::from_mujoco(path, MujocoOptions::named("every")).unwrap();
-        let names = scene.shape_names();
-        for (k, first) in names.iter().enumerate() {
-            let pairs = names[k + 1..].iter();
-            scene
-                .filters
-                .extend(pairs.map(|second| [first.clone(), second.clone()]));
-        }
+        keep_apart(&mut scene);
         let model = scene.compile().unwrap();
         for lanes in widths() {
             let made = Run::new(&model, options(lanes, true)).sim.compiled();
@@ -131,14 +135,7 @@ fn models_of_mujoco_have_the_bits_of_the_stages() {
             );
             for seed in 0..10 {
                 let mut dice = Dice::new(seed);
-                let scope = Scope {
-                    model: &model,
-                    worlds: vec![true; WORLDS],
-                    sources: (0..WORLDS).collect(),
-                    first_kept: 0,
-                    huge: None,
-                };
-                let ops = any_program(&mut dice, &scope, 6);
+                let ops = program(&mut dice, &model, 6);
                 let [stages, code] = [false, true]
                     .map(|compiles| play(&model, &options(lanes, compiles), &ops).unwrap());
                 for world in 0..WORLDS {

@@ -182,6 +182,13 @@ impl Allocation<'_> {
         register
     }
 
+    /// An instruction that assigns a value; its operands may give their registers to it.
+    fn result(&mut self, value: u32, operands: &[Operand], make: impl FnOnce(Register) -> Machine) {
+        self.release(operands);
+        let register = self.assign(value);
+        self.push_assigning(make(register), value, register);
+    }
+
     fn push(&mut self, machine: Machine) {
         self.machine.push((machine, None));
     }

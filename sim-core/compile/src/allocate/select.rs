@@ -10,16 +10,11 @@ impl Allocation<'_> {
         match *instruction {
             Instruction::Load { to, from } => {
                 let kind = self.code.kinds[to as usize];
-                let register = self.assign(to);
-                self.push_assigning(
-                    Machine::Load {
-                        kind,
-                        to: register,
-                        from: from.into(),
-                    },
-                    to,
-                    register,
-                );
+                self.result(to, &[], |register| Machine::Load {
+                    kind,
+                    to: register,
+                    from: from.into(),
+                });
             }
             Instruction::Store { to, x } => {
                 let (from, kind) = (self.register(x), self.kind(x));
@@ -32,14 +27,11 @@ impl Allocation<'_> {
             }
             Instruction::Unary { op, to, a } => {
                 let source = self.source(a);
-                self.release(&[a]);
-                let register = self.assign(to);
-                let machine = Machine::Unary {
+                self.result(to, &[a], |register| Machine::Unary {
                     op,
                     to: register,
                     a: source,
-                };
-                self.push_assigning(machine, to, register);
+                });
             }
             Instruction::Binary { op, to, a, b } => {
                 let (a, b) = match op.commutes() && self.prefers_memory(a) {
@@ -47,26 +39,20 @@ impl Allocation<'_> {
                     _ => (a, b),
                 };
                 let (first, second) = self.pair(a, b);
-                self.release(&[a, b]);
-                let register = self.assign(to);
-                let machine = Machine::Binary {
+                self.result(to, &[a, b], |register| Machine::Binary {
                     op,
                     to: register,
                     a: first,
                     b: second,
-                };
-                self.push_assigning(machine, to, register);
+                });
             }
             Instruction::Less { to, a, b } => {
                 let (first, second) = self.pair(a, b);
-                self.release(&[a, b]);
-                let register = self.assign(to);
-                let machine = Machine::Less {
+                self.result(to, &[a, b], |register| Machine::Less {
                     to: register,
                     a: first,
                     b: second,
-                };
-                self.push_assigning(machine, to, register);
+                });
             }
             Instruction::Select {
                 to,
@@ -76,27 +62,23 @@ impl Allocation<'_> {
             } => {
                 let mask_register = self.register(Operand::Value(mask));
                 let source = self.source(a);
-                self.release(&[Operand::Value(mask), a]);
-                let register = self.assign(to);
-                let machine = Machine::Keep {
+                self.result(to, &[Operand::Value(mask), a], |register| Machine::Keep {
                     to: register,
                     mask: mask_register,
                     a: source,
-                };
-                self.push_assigning(machine, to, register);
+                });
             }
             Instruction::Select { to, mask, a, b } => {
                 let mask_register = self.register(Operand::Value(mask));
                 let (second, first) = self.pair(b, a);
-                self.release(&[Operand::Value(mask), a, b]);
-                let register = self.assign(to);
-                let machine = Machine::Select {
-                    to: register,
-                    mask: mask_register,
-                    a: first,
-                    b: second,
-                };
-                self.push_assigning(machine, to, register);
+                self.result(to, &[Operand::Value(mask), a, b], |register| {
+                    Machine::Select {
+                        to: register,
+                        mask: mask_register,
+                        a: first,
+                        b: second,
+                    }
+                });
             }
             Instruction::Fma {
                 to,
@@ -107,23 +89,21 @@ impl Allocation<'_> {
                 minus_c,
             } => self.fma(to, [a, b, c], minus_product, minus_c),
             Instruction::Everywhere { to } => {
-                let register = self.assign(to);
-                self.push_assigning(Machine::Everywhere { to: register }, to, register);
+                self.result(to, &[], |register| Machine::Everywhere { to: register });
             }
             Instruction::Logic { op, to, a, b } => {
                 let (first, second) = (
                     self.register(Operand::Value(a)),
                     self.register(Operand::Value(b)),
                 );
-                self.release(&[Operand::Value(a), Operand::Value(b)]);
-                let register = self.assign(to);
-                let machine = Machine::Logic {
-                    op,
-                    to: register,
-                    a: first,
-                    b: second,
-                };
-                self.push_assigning(machine, to, register);
+                self.result(to, &[Operand::Value(a), Operand::Value(b)], |register| {
+                    Machine::Logic {
+                        op,
+                        to: register,
+                        a: first,
+                        b: second,
+                    }
+                });
             }
             Instruction::JumpIfNone { mask, label } => {
                 let register = self.register(Operand::Value(mask));

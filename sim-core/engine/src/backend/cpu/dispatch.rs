@@ -54,9 +54,8 @@ pub fn create(
     precision: Precision,
     lanes: Lanes,
     layout: (&Layout, OutputsAt),
-    (threads, compiles): (usize, bool),
+    threads_and_compiles: (usize, bool),
 ) -> Result<Backends, BackendError> {
-    let threads = (threads, compiles);
     let lanes = match lanes {
         // one world in a SIMD register is slower than a scalar, with the same bits
         Lanes::Auto if groups.worlds == 1 => Lanes::Scalar,
@@ -79,7 +78,7 @@ pub fn create(
     match (precision, lanes) {
         (Precision::F64, _) => {
             let compiled = baseline("f64 scalar, FMA", stages_f64::STAGES);
-            boxed(model, groups, layout, threads, compiled)
+            boxed(model, groups, layout, threads_and_compiles, compiled)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => {
@@ -88,16 +87,16 @@ pub fn create(
                 stages: stages_f32x16::STAGES,
                 chunk: avx512,
             };
-            boxed(model, groups, layout, threads, compiled)
+            boxed(model, groups, layout, threads_and_compiles, compiled)
         }
         #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
         (Precision::F32, Lanes::Eight) => {
             let compiled = baseline(EIGHT, stages_f32x8::STAGES);
-            boxed(model, groups, layout, threads, compiled)
+            boxed(model, groups, layout, threads_and_compiles, compiled)
         }
         (Precision::F32, _) => {
             let compiled = baseline("f32 scalar, FMA", stages_f32::STAGES);
-            boxed(model, groups, layout, threads, compiled)
+            boxed(model, groups, layout, threads_and_compiles, compiled)
         }
     }
 }
