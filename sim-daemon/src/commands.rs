@@ -9,7 +9,7 @@ use sim_system::signals;
 use crate::cli::{self, CliCommand};
 use crate::error::DaemonError;
 use crate::terminal::printable;
-use crate::{bench, devices, inspect, list, recording, serve, top};
+use crate::{bench, compile, devices, inspect, list, recording, serve, top};
 
 /// Runs a command line; the exit code is 0 done, 1 failed, 2 misused.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
@@ -22,6 +22,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> i32 {
         CliCommand::Serve(args) => serve::run(args),
         CliCommand::Inspect(args) => inspect::run(args),
         CliCommand::Bench(args) => bench::run(args),
+        CliCommand::Compile(args) => compile::run(args),
         CliCommand::Record(args) => recording::record(args),
         CliCommand::Replay(args) => recording::replay(args),
         CliCommand::Devices => devices::run(),

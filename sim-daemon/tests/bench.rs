@@ -36,19 +36,38 @@ fn bench_of(scene: &str, name: &str, arguments: &[&str]) -> Output {
         let (name, _) = short.split_once('=').expect("a value");
         arguments.iter().any(|given| given.starts_with(name))
     };
+    let quick = QUICK.iter().filter(|short| !is_given(short));
+    let all: Vec<&str> = quick.chain(arguments).copied().collect();
+    run(&["bench"], scene, name, &all, &[])
+}
+
+/// Runs a command on a scene, in an environment with these variables.
+fn run(
+    command: &[&str],
+    scene: &str,
+    name: &str,
+    arguments: &[&str],
+    variables: &[(&str, &str)],
+) -> Output {
     let folder: PathBuf = std::env::temp_dir().join(format!("bench-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
     std::fs::write(folder.join("box.urdf"), BOX).unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_tightloop"))
-        .args(["bench", "scene.toml"])
-        .args(QUICK.iter().filter(|short| !is_given(short)))
+        .args(command)
+        .arg("scene.toml")
         .args(arguments)
+        .envs(variables.iter().copied())
         .current_dir(&folder)
         .output()
         .unwrap();
     std::fs::remove_dir_all(folder).unwrap();
     done
+}
+
+/// The scene without the ground.
+fn falling() -> &'static str {
+    SCENE.split_once("[[shape]]").unwrap().0
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -114,9 +133,13 @@ fn people_get_a_table() {
     }
 }
 
+/// Has this processor a compiler?
+fn compiles() -> bool {
+    cfg!(target_arch = "x86_64") && cpu::available(Lanes::Eight)
+}
+
 #[test]
 fn machine_code_is_reported_where_it_runs() {
-    let (falling, _) = SCENE.split_once("[[shape]]").unwrap();
     let code = |scene, name, arguments: &[&str]| {
         let done = bench_of(scene, name, &[&["--json"], arguments].concat());
         assert!(done.status.success(), "{}", text(&done.stderr));
@@ -127,22 +150,104 @@ fn machine_code_is_reported_where_it_runs() {
         );
         report["machine_code"].clone()
     };
-    // on other processors the stages run
-    let is_here = cfg!(target_arch = "x86_64") && cpu::available(Lanes::Eight);
-    let made = code(falling, "code", &[]);
-    assert_eq!(made.is_array(), is_here, "{made}");
-    assert!(
-        !is_here || made[0]["instructions"].as_u64().unwrap() > 100,
-        "{made}"
-    );
-    assert!(code(falling, "code-stages", &["--stages"]).is_null());
-    assert!(code(SCENE, "code-contacts", &[]).is_null());
-    let table = text(&bench_of(falling, "code-table", &[]).stdout);
+    // on other processors the stages run; the box on the ground is compiled but for its contacts
+    for (scene, name) in [(falling(), "code"), (SCENE, "code-contacts")] {
+        let made = code(scene, name, &[]);
+        assert_eq!(made.is_array(), compiles(), "{made}");
+        assert!(
+            !compiles() || made[0]["instructions"].as_u64().unwrap() > 100,
+            "{made}"
+        );
+    }
+    assert!(code(falling(), "code-stages", &["--stages"]).is_null());
+    let table = text(&bench_of(falling(), "code-table", &[]).stdout);
     assert_eq!(
         table.contains("machine code of a substep"),
-        is_here,
+        compiles(),
         "{table}"
     );
+}
+
+#[test]
+fn a_listing_has_the_instructions_of_each_stage_below_the_lines_that_they_come_from() {
+    let list = |scene, name, arguments: &[&str]| {
+        let done = run(&["compile"], scene, name, arguments, &[]);
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        text(&done.stdout)
+    };
+    if !cfg!(target_arch = "x86_64") {
+        assert!(list(SCENE, "list", &[]).contains("no machine code"));
+        return;
+    }
+    for (lanes, register) in [("--lanes=8", "ymm"), ("--lanes=16", "zmm")] {
+        let sizes = list(SCENE, "list-sizes", &[lanes]);
+        let lines = list(SCENE, "list-lines", &[lanes, "--listing"]);
+        assert!(sizes.contains("stages kinematics to ") && sizes.contains("integrate"));
+        // the first section's table is the sum of its lines
+        let table = sizes.lines().find(|line| line.starts_with("all ")).unwrap();
+        let all: usize = table.split_whitespace().last().unwrap().parse().unwrap();
+        let of_first = lines.split("\nstages ").next().unwrap();
+        let indented = |line: &&str| line.starts_with("        ");
+        assert_eq!(of_first.lines().filter(indented).count(), all, "{lanes}");
+        assert!(!sizes.contains(register) && lines.contains(register));
+        let of_kinematics = lines.lines().filter(|line| line.contains("  kinematics, "));
+        assert!(of_kinematics.clone().count() > 10, "{lines}");
+        assert!(of_kinematics.clone().all(|line| line.contains(".rs:")));
+        assert!(lines.contains("fmadd"), "{lines}");
+    }
+    let wrong = run(&["compile"], SCENE, "list-wrong", &["--lanes=4"], &[]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("use 8 or 16"));
+}
+
+#[test]
+fn machine_code_is_compared_with_the_stages_where_the_environment_asks() {
+    for (scene, name) in [(falling(), "check"), (SCENE, "check-contacts")] {
+        let all = [&QUICK[..], &["--json"]].concat();
+        let done = run(&["bench"], scene, name, &all, &[("TIGHTLOOP_CHECK", "1")]);
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+        let device = report["device"].as_str().unwrap();
+        assert_eq!(device.contains(" (checked)"), compiles(), "{device}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_map_for_perf_names_the_stages_of_machine_code() {
+    let folder = std::env::temp_dir().join(format!("bench-map-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("scene.toml"), falling()).unwrap();
+    std::fs::write(folder.join("box.urdf"), BOX).unwrap();
+    let child = Command::new(env!("CARGO_BIN_EXE_tightloop"))
+        .args(["bench", "scene.toml"])
+        .args(QUICK)
+        .env("TIGHTLOOP_PERF_MAP", "1")
+        .stdout(std::process::Stdio::null())
+        .current_dir(&folder)
+        .spawn()
+        .unwrap();
+    let path = format!("/tmp/perf-{}.map", child.id());
+    assert!(child.wait_with_output().unwrap().status.success());
+    std::fs::remove_dir_all(folder).unwrap();
+    let map = std::fs::read_to_string(&path);
+    assert_eq!(map.is_ok(), compiles(), "{map:?}");
+    if let Ok(map) = map {
+        std::fs::remove_file(&path).unwrap();
+        let piece = |line: &str| {
+            let mut numbers = line
+                .split(' ')
+                .map_while(|word| u64::from_str_radix(word, 16).ok());
+            (numbers.next().unwrap(), numbers.next().unwrap())
+        };
+        let mut pieces: Vec<(u64, u64)> = map.lines().map(piece).collect();
+        pieces.sort_unstable();
+        for pair in pieces.windows(2) {
+            let [(first, bytes), (second, _)] = [pair[0], pair[1]];
+            assert!(first + bytes <= second, "{map}");
+        }
+        assert!(map.contains("tightloop::kinematics"), "{map}");
+    }
 }
 
 #[test]

@@ -29,23 +29,24 @@ pub const DOORS: [(&str, &str); 24] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 48] = [
-    "py-client/src/frame.rs",                          // NumPy views
-    "sim-core/compile/src/lib.rs",                     // runs machine code
-    "sim-core/device/src/host_pages.rs",               // imports pages of the host
-    "sim-core/device/src/program/portable.rs",         // programs without checks at run time
-    "sim-core/device/src/software/exit.rs",            // process exit beside a driver thread
-    "sim-core/device/src/vulkan/export.rs",            // the driver's memory for other processes
-    "sim-core/device/src/vulkan/memory.rs",            // the driver's memory, and the host's
-    "sim-core/device/src/vulkan/mod.rs",               // the driver's handles
-    "sim-core/device/src/vulkan/pipeline.rs",          // as mod.rs
-    "sim-core/device/src/vulkan/recording.rs",         // as mod.rs
-    "sim-core/device/src/vulkan/stamps.rs",            // as mod.rs
-    "sim-core/device/src/vulkan_absent.rs",            // the same functions, never called
-    "sim-core/engine/src/backend/cpu/backend.rs",      // calls what dispatch chose
-    "sim-core/engine/src/backend/cpu/compiled/mod.rs", // runs the machine code of an instruction set
-    "sim-core/engine/src/backend/cpu/contacts.rs",     // rows of a frame, as transfer.rs
-    "sim-core/engine/src/backend/cpu/dispatch.rs",     // instruction sets
+pub const UNSAFE: [&str; 49] = [
+    "py-client/src/frame.rs",                              // NumPy views
+    "sim-core/compile/src/lib.rs",                         // runs machine code
+    "sim-core/device/src/host_pages.rs",                   // imports pages of the host
+    "sim-core/device/src/program/portable.rs",             // programs without checks at run time
+    "sim-core/device/src/software/exit.rs",                // process exit beside a driver thread
+    "sim-core/device/src/vulkan/export.rs", // the driver's memory for other processes
+    "sim-core/device/src/vulkan/memory.rs", // the driver's memory, and the host's
+    "sim-core/device/src/vulkan/mod.rs",    // the driver's handles
+    "sim-core/device/src/vulkan/pipeline.rs", // as mod.rs
+    "sim-core/device/src/vulkan/recording.rs", // as mod.rs
+    "sim-core/device/src/vulkan/stamps.rs", // as mod.rs
+    "sim-core/device/src/vulkan_absent.rs", // the same functions, never called
+    "sim-core/engine/src/backend/cpu/backend.rs", // calls what dispatch chose
+    "sim-core/engine/src/backend/cpu/compiled/check.rs", // runs stages and machine code of an instruction set
+    "sim-core/engine/src/backend/cpu/compiled/section.rs", // runs the machine code of an instruction set
+    "sim-core/engine/src/backend/cpu/contacts.rs",         // rows of a frame, as transfer.rs
+    "sim-core/engine/src/backend/cpu/dispatch.rs",         // instruction sets
     "sim-core/engine/src/backend/cpu/gathering.rs", // runs the solver on gathered worlds, as run.rs
     "sim-core/engine/src/backend/cpu/run.rs",       // calls the stages of an instruction set
     "sim-core/engine/src/backend/cpu/transfer.rs",  // rows of a frame, written by several threads

@@ -29,7 +29,7 @@ def main() -> int:
     from tightloop import _core
 
     arguments = sys.argv[1:]
-    if arguments[:1] in (["serve"], ["bench"]):
+    if arguments[:1] in (["serve"], ["bench"], ["compile"]):
         from tightloop.files import scenes as scene_files
 
         arguments = [scene_files.scene_file(argument) for argument in arguments]

@@ -222,6 +222,8 @@ impl Instruction {
 #[derive(Debug, Default)]
 pub(crate) struct Code {
     pub instructions: Vec<Instruction>,
+    /// The value of the recording that each belongs to; none of what is written at the end.
+    pub sources: Vec<Option<u32>>,
     /// What each value is.
     pub kinds: Vec<Kind>,
     /// Where a value stands in memory anyway, for as long as it is used.

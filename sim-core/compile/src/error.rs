@@ -1,5 +1,6 @@
 //! Why there is no program.
 
+use crate::INSTRUCTIONS_MAX;
 use std::fmt::Debug;
 
 /// Why a recording has no program.
@@ -8,6 +9,14 @@ pub enum CompileError {
     /// The compiler does not know a statement, an operation or an operand.
     #[error("the compiler does not know the recorded `{0}`")]
     Unknown(String),
+    /// A program would be longer than the compiler makes.
+    #[error(
+        "its machine code would have {instructions} instructions, and the limit is {INSTRUCTIONS_MAX}"
+    )]
+    TooLong {
+        /// How long it would be [–].
+        instructions: usize,
+    },
     /// The processor is none that it knows.
     #[error("there is no compiler for this kind of processor")]
     Processor,

@@ -10,26 +10,33 @@
 //! | `code`, `machine` | instructions before and after registers are given out |
 //! | `allocate` | who is in which register |
 //! | `x86` | bytes |
+//! | `listing` | instructions beside the code that they come from |
 //! | `pages` | memory that is written first, and executed afterwards |
 
 mod address;
 mod allocate;
 mod code;
 mod error;
+mod listing;
 mod lower;
 mod machine;
 mod pages;
 mod x86;
 
-pub use address::Address;
+pub use address::{Address, Places};
 pub use error::CompileError;
+pub use listing::Line;
 
-use allocate::Files;
+use allocate::{Allocated, Files};
+use listing::PartBytes;
 use pages::Pages;
 use sim_physics::lane::Tables;
 use sim_record::Recording;
 use std::fmt;
-use x86::{Avx2, Avx512, InstructionSet};
+use x86::{Avx2, Avx512, Encoded, InstructionSet};
+
+/// Most instructions of a program before registers are given out: about 2 MB of code, for which 100 MB of memory are needed [–].
+const INSTRUCTIONS_MAX: usize = 200_000;
 
 /// What a program is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,10 +75,11 @@ pub struct Size {
 pub struct Program {
     pages: Pages,
     size: Size,
+    parts: Vec<PartBytes>,
 }
 
 impl Program {
-    /// Compiles a recording whose inputs and outputs have these addresses.
+    /// Compiles a recording whose inputs, outputs and scratch memory are in these places.
     ///
     /// # Errors
     /// What cannot be compiled, and a system that forbids it.
@@ -80,44 +88,45 @@ impl Program {
     /// If there are more or fewer addresses than inputs and outputs.
     pub fn new(
         recording: &Recording,
-        inputs: &[Address],
-        outputs: &[Address],
+        places: &Places<'_>,
         tables: &Tables<f32>,
         target: Target,
     ) -> Result<Program, CompileError> {
-        assert_eq!(
-            (inputs.len(), outputs.len()),
-            (recording.inputs(), recording.outputs()),
-            "an address for each"
-        );
-        if cfg!(not(target_arch = "x86_64")) {
-            return Err(CompileError::Processor);
-        }
-        let code = lower::lower(recording, inputs, outputs, tables)?;
-        match target {
-            Target::Avx2 => Program::of_code::<Avx2>(&code),
-            Target::Avx512 => Program::of_code::<Avx512>(&code),
-        }
-    }
-
-    fn of_code<S: InstructionSet>(code: &code::Code) -> Result<Program, CompileError> {
-        let files = Files {
-            scalars: S::SCALARS,
-            masks: S::MASKS,
-        };
-        let allocated = allocate::allocate(code, files);
-        let encoded =
-            x86::encode::<S>(&allocated.machine, allocated.slots, code.loops, code.labels)?;
+        let made = Compiled::new(recording, places, tables, target, false)?;
+        let (encoded, allocated) = (&made.encoded, &made.allocated);
         let size = Size {
             bytes: encoded.bytes.len(),
             instructions: encoded.instructions,
             spills: allocated.spills,
-            slots: (allocated.slots + code.loops) as usize,
+            slots: (allocated.slots + made.code.loops) as usize,
         };
         Ok(Program {
             pages: Pages::new(&encoded.bytes, &encoded.constants)?,
             size,
+            parts: listing::parts(recording, &made.code, allocated, encoded),
         })
+    }
+
+    /// The program of a recording for people.
+    ///
+    /// # Errors
+    /// As [`Program::new`], which also asks the system for memory.
+    ///
+    /// # Panics
+    /// As [`Program::new`].
+    pub fn listing(
+        recording: &Recording,
+        places: &Places<'_>,
+        tables: &Tables<f32>,
+        target: Target,
+    ) -> Result<Vec<Line>, CompileError> {
+        let made = Compiled::new(recording, places, tables, target, true)?;
+        Ok(listing::lines(
+            recording,
+            &made.code,
+            &made.allocated,
+            &made.encoded,
+        ))
     }
 
     /// How large it is.
@@ -130,12 +139,19 @@ impl Program {
         self.size.slots
     }
 
+    /// Where its bytes are in memory, by parts of the code that was recorded ([`sim_record::Origin`]): address, bytes and name.
+    pub fn parts(&self) -> impl Iterator<Item = (usize, usize, &'static str)> {
+        let first = self.pages.address() as usize;
+        let parts = self.parts.iter();
+        parts.map(move |part| (first + part.start, part.bytes, part.part))
+    }
+
     /// Runs it on the arrays of a block, in memory of [`Program::scratch`] registers. False if something holds that the recording
-    /// assumes to hold nowhere: then no array was changed.
+    /// assumes to hold nowhere: then nothing was changed.
     ///
     /// # Safety
-    /// The processor has the instructions of the target. Each address leads to an array that has the registers of the inputs and
-    /// outputs. Nobody else uses these and the memory meanwhile.
+    /// The processor has the instructions of the target. Each place leads to an array that has the registers of the inputs and
+    /// outputs, and of the recording's scratch memory. Nobody else uses these and the memory meanwhile.
     #[must_use]
     pub unsafe fn run(&self, arrays: &[*mut f32], scratch: *mut f32) -> bool {
         let (code, constants) = (self.pages.address(), self.pages.constants());
@@ -148,6 +164,57 @@ impl Program {
         }
         #[cfg(not(target_arch = "x86_64"))]
         unreachable!("no program: {code:?}, {constants:?}, {arrays:?}, {scratch:?}")
+    }
+}
+
+/// What becomes of a recording, step by step.
+struct Compiled {
+    code: code::Code,
+    allocated: Allocated,
+    encoded: Encoded,
+}
+
+impl Compiled {
+    /// `lists` asks for the instructions.
+    fn new(
+        recording: &Recording,
+        places: &Places<'_>,
+        tables: &Tables<f32>,
+        target: Target,
+        lists: bool,
+    ) -> Result<Compiled, CompileError> {
+        assert_eq!(
+            (places.inputs.len(), places.outputs.len()),
+            (recording.inputs(), recording.outputs()),
+            "an address for each"
+        );
+        if cfg!(not(target_arch = "x86_64")) {
+            return Err(CompileError::Processor);
+        }
+        let code = lower::lower(recording, places, tables)?;
+        let instructions = code.instructions.len();
+        if instructions > INSTRUCTIONS_MAX {
+            return Err(CompileError::TooLong { instructions });
+        }
+        match target {
+            Target::Avx2 => Compiled::of_code::<Avx2>(code, lists),
+            Target::Avx512 => Compiled::of_code::<Avx512>(code, lists),
+        }
+    }
+
+    fn of_code<S: InstructionSet>(code: code::Code, lists: bool) -> Result<Compiled, CompileError> {
+        let files = Files {
+            scalars: S::SCALARS,
+            masks: S::MASKS,
+        };
+        let allocated = allocate::allocate(&code, files);
+        let (machine, slots) = (&allocated.machine, allocated.slots);
+        let encoded = x86::encode::<S>(machine, slots, code.loops, code.labels, lists)?;
+        Ok(Compiled {
+            code,
+            allocated,
+            encoded,
+        })
     }
 }
 

@@ -8,6 +8,7 @@ use crate::random::{Draws, Numbering};
 use sim_model::Model;
 use sim_physics::arrays::{Field, Layout};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, UNIX_EPOCH};
 
 pub use crate::backend::gpu::Cuts;
@@ -50,7 +51,7 @@ const COMPILE_LIMIT: Duration = Duration::from_secs(180);
 const COMPILE_LIMIT_NAME: &str = "TIGHTLOOP_COMPILE_LIMIT";
 
 /// How to run a model.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Number of worlds.
     pub worlds: usize,
@@ -73,6 +74,9 @@ pub struct Options {
     /// Whether the processor runs a model as machine code of its own where that can be made, instead of stages that were compiled
     /// for all models: faster, with the same bits.
     pub compiles: bool,
+    /// Compares that machine code first with the stages of this model, which outside of tests is the one that runs. Where it differs,
+    /// stages run, and the device's name has the reason.
+    pub checked_with: Option<Arc<Model>>,
     /// Fields of a frame; counters come with every frame.
     pub fields: Vec<Field>,
     /// Which state the evaluated outputs of a step belong to.
@@ -98,6 +102,7 @@ impl Default for Options {
             threads: None,
             lanes: Lanes::Auto,
             compiles: true,
+            checked_with: None,
             fields: vec![Field::JointQ, Field::JointQd, Field::BodyQ],
             outputs_at: OutputsAt::Frame,
             faults: Faults::default(),
@@ -128,6 +133,12 @@ pub fn compile_limit() -> Result<Duration, BackendError> {
     let seconds = value.parse().unwrap_or(f64::NAN);
     let limit = Duration::try_from_secs_f64(seconds);
     limit.map_err(|_| BackendError::CompileLimit { value })
+}
+
+/// What a launch compares a model's machine code with: with `TIGHTLOOP_CHECK=1` its stages, else nothing.
+pub fn machine_code_check(model: &Arc<Model>) -> Option<Arc<Model>> {
+    let checks = std::env::var_os("TIGHTLOOP_CHECK").is_some_and(|value| value == "1");
+    checks.then(|| Arc::clone(model))
 }
 
 /// Whether [`Device::Auto`] accepts a software driver: `TIGHTLOOP_AUTO_SOFTWARE=1`, for tests of daemons.
@@ -165,15 +176,12 @@ pub(crate) fn backends(
     };
     let on_cpu = || {
         let layout = (layout, options.outputs_at);
-        let threads = threads_of(options);
-        cpu::create(
-            model,
-            groups,
-            precision,
-            options.lanes,
-            layout,
-            (threads, options.compiles),
-        )
+        let running = cpu::CpuOptions {
+            threads: threads_of(options),
+            compiles: options.compiles,
+            checked_with: options.checked_with.as_deref(),
+        };
+        cpu::create(model, groups, precision, options.lanes, layout, running)
     };
     let lags = options.outputs_at == OutputsAt::LastSubstep;
     let note = match &options.device {

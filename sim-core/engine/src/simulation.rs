@@ -116,10 +116,13 @@ impl Simulation {
     pub fn device(&self) -> &str {
         self.backend.device()
     }
-    /// Sizes of the machine code of a substep, without rare cases and with them; none where the stages run that were compiled for
-    /// all models.
+    /// Sizes of the machine code of a substep, without rare cases and with them; none where no stage is compiled.
     pub fn compiled(&self) -> Option<[MachineCode; 2]> {
         self.backend.compiled()
+    }
+    /// Where the machine code of a substep is in memory: address, bytes and stage of each piece; empty where no stage is compiled.
+    pub fn code_pieces(&self) -> Vec<(usize, usize, &'static str)> {
+        self.backend.code_pieces()
     }
     /// Why [`Device::Auto`] chose this device, for people.
     pub fn device_note(&self) -> Option<&str> {

@@ -36,7 +36,7 @@ pub mod split;
 pub mod wgsl;
 
 pub use error::{MAX_NESTING, Misuse, RecordError};
-pub use ir::recording::{Recording, Statements};
+pub use ir::recording::{Origin, Recording, Statements};
 pub use record::record;
 pub use recorder::Recorder;
 pub use recorder::handles::{

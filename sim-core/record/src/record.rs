@@ -1,13 +1,13 @@
 //! Records physics code.
 
 use crate::error::RecordError;
-use crate::ir::recording::Recording;
+use crate::ir::recording::{Origin, Recording};
 use crate::ir::tree::Operand;
 use crate::passes::dead_code;
 use crate::passes::loop_fusion;
 use crate::recorder::Recorder;
 use crate::recorder::handles::Recorded;
-use crate::recorder::state;
+use crate::recorder::state::{self, Value};
 use std::panic::Location;
 
 /// Records physics code with so many scalar inputs. What the code returns are the outputs, in order.
@@ -41,6 +41,11 @@ pub fn record(
     let kept: Vec<Operand> = outputs.iter().copied().chain(state.assumed).collect();
     dead_code::prune(&state.values, &mut body, &kept, place)?;
     let mut values = state.values.iter().map(|v| v.op).collect();
+    let origin = |value: &Value| Origin {
+        part: value.part,
+        place: value.place,
+    };
+    let origins = state.values.iter().map(origin).collect();
     let mut names = state.counters().names as usize;
     loop_fusion::fuse(&mut body, &mut values, &mut names);
     let mut recording = Recording {
@@ -48,6 +53,7 @@ pub fn record(
         outputs,
         names,
         values,
+        origins,
         scratch: 0,
         lanes: state.lanes,
         assumed: state.assumed,

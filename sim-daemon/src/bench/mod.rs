@@ -3,16 +3,20 @@
 mod commands;
 mod report;
 
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 use sim_engine::backend::{Values, cpu};
+use sim_engine::options::machine_code_check;
 use sim_engine::simulation::{Lanes, MachineCode, Options, Precision, Profile, Simulation};
 use sim_model::{KeyState, Model};
 use sim_physics::arrays::Field;
 
 use crate::cli::Bench;
 use crate::error::DaemonError;
+use crate::perf_map;
 use crate::serve::read_scene;
+use crate::terminal::printable;
 use commands::Commands;
 
 /// Rates are medians of so many turns.
@@ -37,9 +41,10 @@ struct Measured {
 
 /// Measures a scene, and prints what was found.
 pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
-    let options = check(args)?;
+    let mut options = check(args)?;
     let (scene, folder) = read_scene(&args.scene)?;
     let model = scene.describe(&folder)?.compile()?;
+    options.checked_with = machine_code_check(&model);
     let start = keyframe(&model, args.keyframe.as_deref())?;
     let swing = if args.commands == "hold" {
         0.0
@@ -48,6 +53,9 @@ pub(crate) fn run(args: &Bench) -> Result<(), DaemonError> {
     };
     let mut commands = Commands::new(&model, start.as_ref(), options.worlds, swing);
     let mut simulation = Simulation::new(model.clone(), &options)?;
+    if let Some(note) = perf_map::write(&simulation) {
+        let _ = writeln!(std::io::stderr(), "{}", printable(&note));
+    }
     if let Some(key) = &start {
         place(&mut simulation, key)?;
     }

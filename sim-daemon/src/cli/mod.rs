@@ -47,6 +47,13 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop bench scene.toml --worlds 4096
     Bench(Box<Bench>),
+    /// Show the machine code that a scene's model becomes, by stage.
+    ///
+    /// Models without contacts are compiled as a whole. Of small ones with contacts, the stages before contacts are found and
+    /// the integrator are. Large models are not compiled. Prints the size of each stage's code; --listing adds the instructions.
+    ///
+    /// Example: tightloop compile scene.toml --listing
+    Compile(Compile),
     /// Record every command that a daemon executes into a file for `replay`.
     ///
     /// Writes states, commands, resets, parameters and digests of frames until Ctrl-C or until the daemon ends. The
@@ -323,6 +330,22 @@ pub(crate) struct Bench {
     pub(crate) json: bool,
 }
 
+/// Arguments of `compile` as given; `compile` checks them.
+#[derive(Debug, Args)]
+pub(crate) struct Compile {
+    /// Scene file in TOML, or with the Python package an MJCF file that ends in .xml; `-` reads standard input, with paths
+    /// relative to the working folder.
+    pub(crate) scene: PathBuf,
+
+    /// Worlds per block: 8 (AVX2) or 16 (AVX-512); default: the most that the processor has.
+    #[arg(long)]
+    pub(crate) lanes: Option<usize>,
+
+    /// Print the instructions, each below the line of the physics code that it comes from.
+    #[arg(long)]
+    pub(crate) listing: bool,
+}
+
 /// Arguments of `top` as given; `top` checks them.
 #[derive(Debug, Args)]
 pub(crate) struct Top {
@@ -487,6 +510,7 @@ mod tests {
             ("replay", include_str!("help/replay.txt")),
             ("inspect", include_str!("help/inspect.txt")),
             ("bench", include_str!("help/bench.txt")),
+            ("compile", include_str!("help/compile.txt")),
         ] {
             let mut command = Cli::command().term_width(100);
             command.build(); // so that usage lines begin with `tightloop`

@@ -21,6 +21,7 @@ use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
+use crate::perf_map;
 use crate::serve::groups;
 use crate::serve::janitor::Janitor;
 use crate::serve::least_memory::check_least_memory;
@@ -207,7 +208,7 @@ impl Door<'_> {
 /// Everything before the first client may come, except the services.
 fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     // of each group
-    let options = check(serve)?;
+    let mut options = check(serve)?;
     let refusals = pace::ask_system(serve)?;
     let count = serve.groups as usize;
     let paths = DaemonPaths::new(None, &serve.name)?;
@@ -247,6 +248,7 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     let description = scene.describe(&folder)?;
     check_least_memory(&description, &options, count)?;
     let model = description.compile()?;
+    options.checked_with = options::machine_code_check(&model);
     let layout = Simulation::layout_of(&model, &options);
     let table = export::frame_table(&layout);
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -268,6 +270,7 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     announced.notes.extend(refusals);
     let simulations = Simulation::groups(model, &options, count)?;
     announced.notes.extend(pace::lock_memory(serve));
+    announced.notes.extend(perf_map::write(&simulations[0]));
     announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
     announced.watch_state_bytes = simulations[0].snapshot_bytes(announced.watch_worlds) as u64;
     // again with what observers see, of all groups before the first one opens; the worlds have their memory

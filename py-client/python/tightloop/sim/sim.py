@@ -54,8 +54,8 @@ class Sim(Attributes):
         name: Name of the daemon, or of this group of worlds, such as ``"franka.0"``.
         pid: Process id of the daemon.
         device: Device that runs the physics, such as ``"cpu (AVX-512, 16 worlds a block, 2 threads)"``.
-            With ``machine code`` in it, the model runs as machine code of its own. ``stages only: …`` gives
-            the reason where that failed.
+            With ``machine code`` in it, the model runs as machine code of its own, entirely or
+            ``but for contacts and solver``. ``stages only: …`` gives the reason where that failed.
         precision: ``"f32"`` or ``"f64"``, the type of every real array.
         worlds: Number of worlds.
         threads: Largest number of threads of a step; all groups of a daemon share them.

@@ -18,6 +18,8 @@ use uses::Uses;
 /// Machine instructions, and how many registers of memory they use.
 pub(crate) struct Allocated {
     pub machine: Vec<Machine>,
+    /// The instruction that each belongs to.
+    pub sources: Vec<u32>,
     pub slots: u32,
     /// Values that had to leave the registers.
     pub spills: usize,
@@ -46,6 +48,15 @@ pub(crate) fn allocate(code: &Code, files: Files) -> Allocated {
     allocation.finish()
 }
 
+/// A machine instruction.
+struct Emitted {
+    machine: Machine,
+    /// The instruction that it belongs to.
+    source: u32,
+    /// The value that it assigns, and its register.
+    assigned: Option<(u32, Register)>,
+}
+
 struct Allocation<'a> {
     code: &'a Code,
     uses: Uses,
@@ -56,8 +67,7 @@ struct Allocation<'a> {
     spilled: Vec<bool>,
     assigned_at: Vec<u32>,
     at: u32,
-    /// Instructions, with the value that they assign.
-    machine: Vec<(Machine, Option<(u32, Register)>)>,
+    machine: Vec<Emitted>,
     /// What the registers hold where a label is jumped to.
     labels: Vec<Option<Registers>>,
     /// What they held where a loop began.
@@ -190,11 +200,19 @@ impl Allocation<'_> {
     }
 
     fn push(&mut self, machine: Machine) {
-        self.machine.push((machine, None));
+        self.emit(machine, None);
+    }
+
+    fn emit(&mut self, machine: Machine, assigned: Option<(u32, Register)>) {
+        self.machine.push(Emitted {
+            machine,
+            source: self.at,
+            assigned,
+        });
     }
 
     fn push_assigning(&mut self, machine: Machine, value: u32, register: Register) {
-        self.machine.push((machine, Some((value, register))));
+        self.emit(machine, Some((value, register)));
         self.assigned_at[value as usize] = self.at;
         if self.uses.after(value, self.at).is_none() {
             self.drop_value(value);
@@ -289,11 +307,13 @@ impl Allocation<'_> {
             })
             .collect();
         let (slots, end) = slots::give(&mut lifetimes, self.code.kinds.len(), self.code.variables);
-        let mut machine = Vec::with_capacity(self.machine.len() + lifetimes.len());
-        for (mut instruction, assigned) in self.machine {
-            slots::settle(&mut instruction, &slots);
-            machine.push(instruction);
-            if let Some((value, from)) = assigned
+        let length = self.machine.len() + lifetimes.len();
+        let (mut machine, mut sources) = (Vec::with_capacity(length), Vec::with_capacity(length));
+        for mut emitted in self.machine {
+            slots::settle(&mut emitted.machine, &slots);
+            machine.push(emitted.machine);
+            sources.push(emitted.source);
+            if let Some((value, from)) = emitted.assigned
                 && self.spilled[value as usize]
             {
                 machine.push(Machine::Store {
@@ -301,10 +321,12 @@ impl Allocation<'_> {
                     to: Memory::Slot(slots[value as usize]),
                     from,
                 });
+                sources.push(emitted.source);
             }
         }
         Allocated {
             machine,
+            sources,
             slots: end,
             spills: lifetimes.len(),
         }

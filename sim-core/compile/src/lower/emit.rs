@@ -28,6 +28,20 @@ impl Lowering<'_> {
         to
     }
 
+    /// What is in memory now.
+    pub(super) fn load(&mut self, from: Place) -> Operand {
+        let to = self.code.value(Kind::Scalar, None);
+        self.emit(Instruction::Load { to, from });
+        Operand::Value(to)
+    }
+
+    /// Writes to memory where the mask holds.
+    pub(super) fn store_where(&mut self, mask: u32, to: Place, x: Operand) {
+        let before = self.load(to);
+        let x = self.select(mask, x, before);
+        self.emit(Instruction::Store { to, x });
+    }
+
     pub(super) fn variable(&mut self) -> u32 {
         self.code.variables += 1;
         self.code.variables - 1
@@ -103,6 +117,7 @@ impl Lowering<'_> {
             other => other,
         };
         self.code.instructions.push(instruction);
+        self.code.sources.push(self.source);
     }
 
     pub(super) fn in_register(&mut self, x: Operand) -> Operand {

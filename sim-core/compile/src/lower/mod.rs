@@ -7,35 +7,35 @@ mod emit;
 mod operands;
 mod operations;
 
-use crate::address::Address;
+use crate::address::{Address, Places};
 use crate::code::{Code, Instruction, Kind, Label, Logic, Operand, Place};
 use crate::error::CompileError;
 use sim_physics::lane::Tables;
 use sim_record::Recording;
-use sim_record::ir::tree::{self, Bounds, Row, Statement};
+use sim_record::ir::tree::{self, Bounds, Cell, Row, Statement};
 use std::collections::HashMap;
 
-/// Translates a recording whose inputs and outputs have these places.
+/// Translates a recording whose inputs, outputs and scratch memory have these places.
 pub(crate) fn lower(
     recording: &Recording,
-    inputs: &[Address],
-    outputs: &[Address],
+    places: &Places<'_>,
     tables: &Tables<f32>,
 ) -> Result<Code, CompileError> {
     let mut lowering = Lowering {
         recording,
         tables,
-        inputs,
+        places: *places,
         code: Code::default(),
         values: vec![None; recording.values()],
         read: HashMap::new(),
         constants: HashMap::new(),
         refuses: false,
+        source: None,
         variables: HashMap::new(),
     };
     lowering.body(recording.body(), &mut Active::default())?;
     lowering.refuse_if_assumed_wrongly()?;
-    lowering.write(outputs)?;
+    lowering.write(places.outputs)?;
     Ok(lowering.code)
 }
 
@@ -51,7 +51,7 @@ struct Active {
 struct Lowering<'a> {
     recording: &'a Recording,
     tables: &'a Tables<f32>,
-    inputs: &'a [Address],
+    places: Places<'a>,
     code: Code,
     /// By number in the recording.
     values: Vec<Option<Operand>>,
@@ -59,6 +59,8 @@ struct Lowering<'a> {
     read: HashMap<u32, u32>,
     /// Values that are constants, by their bits.
     constants: HashMap<u32, u32>,
+    /// The value of the recording that is computed, or was last.
+    source: Option<u32>,
     /// Whether the end for what was assumed wrongly has been added.
     refuses: bool,
     /// By name: the variable, and the mask of the worlds for which it began.
@@ -90,6 +92,7 @@ impl Lowering<'_> {
                 });
             }
             Statement::Set { name, value } => self.set(*name, *value, *active)?,
+            Statement::Store { cell, value } => self.store(cell, *value, *active)?,
             Statement::When { mask, body } => {
                 let mask = self.mask(*mask)?;
                 let inside = match active.mask {
@@ -189,19 +192,30 @@ impl Lowering<'_> {
         let x = self.scalar(value)?;
         let (variable, began) = self.variables[&name];
         let place = Place::Variable(variable);
-        let x = match active.mask {
+        match active.mask {
             // worlds for which it did not begin never read it
-            Some(mask) if active.mask != began => {
-                let before = self.code.value(Kind::Scalar, None);
-                self.emit(Instruction::Load {
-                    to: before,
-                    from: place,
-                });
-                self.select(mask, x, Operand::Value(before))
-            }
-            _ => x,
-        };
-        self.emit(Instruction::Store { to: place, x });
+            Some(mask) if active.mask != began => self.store_where(mask, place, x),
+            _ => self.emit(Instruction::Store { to: place, x }),
+        }
+        Ok(())
+    }
+
+    fn store(
+        &mut self,
+        cell: &Cell,
+        value: tree::Operand,
+        active: Active,
+    ) -> Result<(), CompileError> {
+        // the program may still refuse, and must not have written then
+        if self.recording.assumed().is_some() && !self.refuses {
+            return Err(CompileError::unknown(cell));
+        }
+        let x = self.scalar(value)?;
+        let to = self.cell(cell)?;
+        match active.mask {
+            Some(mask) => self.store_where(mask, to, x),
+            None => self.emit(Instruction::Store { to, x }),
+        }
         Ok(())
     }
 
@@ -217,6 +231,7 @@ impl Lowering<'_> {
 
     /// The outputs, after all has been computed.
     fn write(&mut self, outputs: &[Address]) -> Result<(), CompileError> {
+        self.source = None;
         let mut stores = Vec::new();
         for (x, to) in self.recording.results().to_vec().iter().zip(outputs) {
             let mut x = self.scalar(*x)?;
@@ -227,14 +242,7 @@ impl Lowering<'_> {
             match home {
                 Some(home) if home == Place::from(*to) => continue,
                 // another output may go where it stands
-                Some(home) => {
-                    let copy = self.code.value(Kind::Scalar, None);
-                    self.emit(Instruction::Load {
-                        to: copy,
-                        from: home,
-                    });
-                    x = Operand::Value(copy);
-                }
+                Some(home) => x = self.load(home),
                 None => {}
             }
             stores.push(Instruction::Store {

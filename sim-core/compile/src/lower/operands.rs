@@ -1,9 +1,9 @@
 //! Operands of a recording: signs, masks, and what stands in memory.
 
 use super::Lowering;
-use crate::code::{Binary, Instruction, Kind, Logic, Operand};
+use crate::code::{Binary, Instruction, Kind, Logic, Operand, Place};
 use crate::error::CompileError;
-use sim_record::ir::tree::{self, Op};
+use sim_record::ir::tree::{self, Cell, Op, Row};
 
 /// Bits of -0.
 const SIGN: u32 = 0x8000_0000;
@@ -70,6 +70,16 @@ impl Lowering<'_> {
         }
     }
 
+    /// A scalar in scratch memory.
+    pub(super) fn cell(&self, cell: &Cell) -> Result<Place, CompileError> {
+        let (Some(base), Row::At(row)) = (self.places.memory, cell.row) else {
+            return Err(CompileError::unknown(cell));
+        };
+        let at = cell.table.base + row * cell.table.stride + cell.number;
+        let at = at as u32;
+        Ok(Place::Array { base, at })
+    }
+
     pub(super) fn everywhere(&mut self) -> u32 {
         let to = self.code.value(Kind::Mask, None);
         self.emit(Instruction::Everywhere { to });
@@ -77,7 +87,7 @@ impl Lowering<'_> {
     }
 
     pub(super) fn input(&mut self, input: u32) -> u32 {
-        let home = self.inputs[input as usize].into();
+        let home = self.places.inputs[input as usize].into();
         let code = &mut self.code;
         *(self.read.entry(input)).or_insert_with(|| code.value(Kind::Scalar, Some(home)))
     }

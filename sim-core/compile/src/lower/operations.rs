@@ -10,18 +10,18 @@ const MAGNITUDE: u32 = 0x7fff_ffff;
 
 impl Lowering<'_> {
     pub(super) fn compute(&mut self, number: u32) -> Result<(), CompileError> {
+        self.source = Some(number);
         let op = self.recording.value(number);
         let to = match op {
             // where they are used
             Op::Unary(tree::Unary::Neg | tree::Unary::Not, _) | Op::Input(_) => return Ok(()),
             Op::Get(name) => {
                 let (variable, _) = self.variables[&name];
-                let to = self.code.value(Kind::Scalar, None);
-                self.emit(Instruction::Load {
-                    to,
-                    from: Place::Variable(variable),
-                });
-                Operand::Value(to)
+                self.load(Place::Variable(variable))
+            }
+            Op::Load(cell) => {
+                let from = self.cell(&cell)?;
+                self.load(from)
             }
             Op::Unary(unary, a) => {
                 let a = self.scalar(a)?;

@@ -3,7 +3,9 @@
 use super::{Encoded, InstructionSet};
 use crate::code::Unary;
 use crate::machine::{Machine, Memory, Source};
-use iced_x86::{Code, Encoder, IcedError, Instruction, MemoryOperand, Register as X86};
+use iced_x86::{
+    Code, Encoder, FastFormatter, IcedError, Instruction, MemoryOperand, Register as X86,
+};
 use std::collections::HashMap;
 
 /// Holds the addresses of the caller's arrays.
@@ -39,6 +41,8 @@ pub(crate) struct Assembler {
     to_refusal: Vec<(usize, u32)>,
     /// Where a program ends that refuses.
     refusal: usize,
+    /// Instructions and where they begin, if someone asks for them.
+    pub listing: Option<Vec<(u32, Instruction)>>,
 }
 
 impl Assembler {
@@ -59,7 +63,13 @@ impl Assembler {
             to_starts: Vec::new(),
             to_refusal: Vec::new(),
             refusal: 0,
+            listing: None,
         }
+    }
+
+    /// Bytes so far.
+    pub fn position(&self) -> usize {
+        self.position
     }
 
     /// Moves the addresses of slots and constants to their middle.
@@ -86,7 +96,8 @@ impl Assembler {
     }
 
     /// The bytes, with jumps that lead where they should.
-    pub fn finish(mut self) -> Encoded {
+    pub fn finish(mut self, starts: Vec<u32>) -> Encoded {
+        let mut listing = self.listing.take().unwrap_or_default();
         let mut bytes = self.encoder.take_buffer();
         let refusal = [Some(self.refusal)];
         let jumps = [
@@ -100,16 +111,26 @@ impl Assembler {
                 let distance = place as i64 - *end as i64;
                 let distance = i32::try_from(distance).expect("a program is below 2 GB");
                 bytes[end - 4..*end].copy_from_slice(&distance.to_le_bytes());
+                // the jump is the last instruction that begins before its end
+                let after = listing.partition_point(|(start, _)| (*start as usize) < *end);
+                if let Some((_, jump)) = listing[..after].last_mut() {
+                    jump.set_near_branch64(place as u64);
+                }
             }
         }
         Encoded {
             bytes,
             constants: self.order,
             instructions: self.instructions,
+            starts,
+            listing: texts(&listing),
         }
     }
 
     pub fn push(&mut self, instruction: &Instruction) -> Result<(), IcedError> {
+        if let Some(listing) = &mut self.listing {
+            listing.push((self.position as u32, *instruction));
+        }
         self.position += self.encoder.encode(instruction, self.position as u64)?;
         self.instructions += 1;
         Ok(())
@@ -309,6 +330,17 @@ impl Assembler {
         self.bases[k] = Some((array, now));
         Ok(BASES[k])
     }
+}
+
+/// Instructions for people.
+fn texts(listing: &[(u32, Instruction)]) -> Vec<(u32, String)> {
+    let mut formatter = FastFormatter::new();
+    let texts = listing.iter().map(|(start, instruction)| {
+        let mut text = String::new();
+        formatter.format(instruction, &mut text);
+        (*start, text)
+    });
+    texts.collect()
 }
 
 fn address(base: X86, displacement: i64, is_broadcast: bool) -> MemoryOperand {

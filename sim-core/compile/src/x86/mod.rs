@@ -46,25 +46,33 @@ pub(crate) struct Encoded {
     /// In the order of their addresses; each fills a register where the set does not spread them.
     pub constants: Vec<f32>,
     pub instructions: usize,
+    /// Where the bytes of each machine instruction begin.
+    pub starts: Vec<u32>,
+    /// All instructions in the syntax of Intel's manuals and where they begin, if they were asked for.
+    pub listing: Vec<(u32, String)>,
 }
 
-/// Encodes a program of so many slots, loops and labels.
+/// Encodes a program of so many slots, loops and labels. `lists` asks for its instructions.
 pub(crate) fn encode<S: InstructionSet>(
     machine: &[Machine],
     slots: u32,
     loops: u32,
     labels: u32,
+    lists: bool,
 ) -> Result<Encoded, CompileError> {
     let mut assembler = Assembler::new(S::WIDTH, S::BROADCASTS, slots, loops, labels);
+    assembler.listing = lists.then(Vec::new);
+    let mut starts = Vec::with_capacity(machine.len());
     let mut all = || {
         assembler.begin()?;
         for instruction in machine {
+            starts.push(assembler.position() as u32);
             assembler.machine::<S>(instruction)?;
         }
         assembler.end()
     };
     all().map_err(|error: IcedError| CompileError::Encoding(error.to_string()))?;
-    Ok(assembler.finish())
+    Ok(assembler.finish(starts))
 }
 
 /// Two instructions of a mask that read and write one file of registers.

@@ -1,11 +1,12 @@
 //! Programs of machine code beside the interpreter of recordings: every bit, in every lane.
 
+mod listing;
 mod random_code;
 
 use random_code::{INPUTS, Random, code, run};
-use sim_compile::{Address, CompileError, Program, Target};
+use sim_compile::{Address, CompileError, Places, Program, Target};
 use sim_physics::lane::simd::widths;
-use sim_physics::lane::{Cx, Fixed, Num, Tables};
+use sim_physics::lane::{Cx, Fixed, Num, Table, Tables};
 use sim_physics::{times, when};
 use sim_record::{Recorded, Recorder, Recording, record};
 
@@ -32,9 +33,12 @@ fn compiled(recording: &Recording, target: Target) -> Result<Program, CompileErr
         let each = (0..n as u32).map(|at| Address { array, at });
         each.collect()
     };
-    let inputs = addresses(0, recording.inputs());
-    let outputs = addresses(1, recording.outputs());
-    Program::new(recording, &inputs, &outputs, &tables(), target)
+    let places = Places {
+        inputs: &addresses(0, recording.inputs()),
+        outputs: &addresses(1, recording.outputs()),
+        memory: Some(2),
+    };
+    Program::new(recording, &places, &tables(), target)
 }
 
 fn tables() -> Tables<f32> {
@@ -61,13 +65,14 @@ fn outputs(
     let mut inputs = vec![Line([0.0; 16]); lines(recording.inputs())];
     let mut results = vec![Line([BEFORE; 16]); lines(recording.outputs())];
     let mut scratch = vec![Line([f32::NAN; 16]); lines(program.scratch())];
+    let mut memory = vec![Line([BEFORE; 16]); lines(recording.scratch())];
     for (lane, world) in worlds.iter().enumerate() {
         for (k, x) in world.iter().enumerate() {
             let place = k * width + lane;
             inputs[place / 16].0[place % 16] = *x;
         }
     }
-    let arrays = [inputs.as_mut_ptr().cast(), results.as_mut_ptr().cast()];
+    let arrays = [&mut inputs, &mut results, &mut memory].map(|lines| lines.as_mut_ptr().cast());
     // SAFETY: the arrays have the registers of inputs and outputs, and `targets` are those that this processor has.
     let done = unsafe { program.run(&arrays, scratch.as_mut_ptr().cast()) };
     let result = |lane: usize, k: usize| {
@@ -99,7 +104,8 @@ fn assert_same(recording: &Recording, random: &mut Random, what: &str) -> usize 
             .collect();
         let results = outputs(&program, recording, width, &worlds).expect("it assumes nothing");
         for (lane, (world, result)) in worlds.iter().zip(&results).enumerate() {
-            let expected = recording.evaluate(world, &mut [], &tables());
+            let mut memory = vec![BEFORE; recording.scratch()];
+            let expected = recording.evaluate(world, &mut memory, &tables());
             let bits = |x: &[f32]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
             assert_eq!(
                 bits(result),
@@ -172,11 +178,49 @@ fn values_from_before_a_loop_are_there_in_every_iteration() {
 }
 
 #[test]
+fn scratch_memory_keeps_what_was_written_where_the_world_was_active() {
+    let table = Table {
+        base: 3,
+        stride: 4,
+        rows: 5,
+    };
+    let recording = record(INPUTS, |cx, x| {
+        let [first, last] = [cx.at(0), cx.at(4)];
+        cx.fill(table, last, 3, x[0]);
+        cx.store(table, first, 1, x[1]);
+        let before = cx.load(table, first, 2);
+        when!(cx, x[2].lt(x[3]), {
+            cx.store(table, last, 3, x[4]);
+            cx.store(table, first, 2, x[5] * x[0]);
+            when!(cx, x[1].lt(x[0]), {
+                let more = cx.load(table, first, 2) + x[3];
+                cx.store(table, first, 2, more);
+            });
+        });
+        vec![
+            cx.load(table, last, 3),
+            cx.load(table, first, 1),
+            cx.load(table, first, 2),
+            before,
+        ]
+    });
+    let recording = recording.unwrap();
+    for seed in 0..20 {
+        assert_same(&recording, &mut Random(seed), "a table");
+    }
+}
+
+#[test]
 fn outputs_may_change_places_with_the_inputs() {
     let recording = record(3, |_, x| vec![x[1], x[0], x[2] + x[0]]).unwrap();
     for (target, width) in targets() {
-        let places: Vec<Address> = (0..3).map(|at| Address { array: 0, at }).collect();
-        let program = Program::new(&recording, &places, &places, &tables(), target).unwrap();
+        let addresses: Vec<Address> = (0..3).map(|at| Address { array: 0, at }).collect();
+        let places = Places {
+            inputs: &addresses,
+            outputs: &addresses,
+            memory: None,
+        };
+        let program = Program::new(&recording, &places, &tables(), target).unwrap();
         let mut array = [Line([0.0; 16]); 3];
         let numbers = array.numbers_mut();
         for (k, x) in numbers.iter_mut().enumerate() {
@@ -335,7 +379,12 @@ fn each_input_may_be_in_an_array_of_its_own() {
         };
         let inputs: Vec<Address> = (0..ARRAYS).map(address).collect();
         let results: Vec<Address> = (ARRAYS..ARRAYS + 2).map(address).collect();
-        let program = Program::new(&recording, &inputs, &results, &tables(), target).unwrap();
+        let places = Places {
+            inputs: &inputs,
+            outputs: &results,
+            memory: None,
+        };
+        let program = Program::new(&recording, &places, &tables(), target).unwrap();
         let mut arrays: Vec<Line> = (0..ARRAYS + 2).map(|k| Line([k as f32; 16])).collect();
         let places: Vec<*mut f32> = arrays.iter_mut().map(|line| line.0.as_mut_ptr()).collect();
         let mut scratch = vec![Line([0.0; 16]); program.scratch() + 1];

@@ -16,7 +16,7 @@ pub use error::BackendError;
 pub use frozen::{FirstFrozen, Frozen};
 pub use input::{Input, Values};
 pub use profile::{Histogram, LaneWork, Part, Profile, StageProfile};
-pub use sim_compile::Size as MachineCode;
+pub use sim_compile::{Line as CodeLine, Size as MachineCode};
 pub use sim_device::HostPages;
 
 use crate::random::Numbering;
@@ -159,9 +159,13 @@ pub trait Backend: Send {
     fn programs(&self) -> &[ProgramInfo] {
         &[]
     }
-    /// Sizes of the machine code of a substep, without rare cases and with them; none where stages run, and on a GPU.
+    /// Sizes of the machine code of a substep, without rare cases and with them; none where no stage is compiled, and on a GPU.
     fn compiled(&self) -> Option<[MachineCode; 2]> {
         None
+    }
+    /// Where the machine code of a substep is in memory: address, bytes and stage of each piece; empty where no stage is compiled.
+    fn code_pieces(&self) -> Vec<(usize, usize, &'static str)> {
+        Vec::new()
     }
     /// What each command of the first tile's last frame took on the device [s]; empty where they are not timed, and on the CPU.
     fn seconds(&self) -> Vec<(&str, f64)> {

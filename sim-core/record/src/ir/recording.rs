@@ -1,6 +1,16 @@
 //! A recording: what physics code computes, as statements over values.
 
 use crate::ir::tree::{Cell, Op, Operand, Row, Statement};
+use std::panic::Location;
+
+/// Where in the code a value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The part of the code that it belongs to, see [`Recorder::begin_part`](crate::Recorder::begin_part).
+    pub part: &'static str,
+    /// The operation that computes it.
+    pub place: &'static Location<'static>,
+}
 
 /// What physics code computes, as statements.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,6 +19,8 @@ pub struct Recording {
     pub(crate) outputs: Vec<Operand>,
     /// How each value is computed, inputs first. Dead values are in no statement.
     pub(crate) values: Vec<Op>,
+    /// Where each comes from; those that passes added have none.
+    pub(crate) origins: Vec<Origin>,
     /// Variables, lists, indices and rows are numbered below this.
     pub(crate) names: usize,
     /// Scalars of scratch memory that the tables reach.
@@ -71,6 +83,11 @@ impl Recording {
     /// How a value is computed.
     pub fn value(&self, number: u32) -> Op {
         self.values[number as usize]
+    }
+
+    /// Where a value comes from, if the code computes it.
+    pub fn origin(&self, number: u32) -> Option<Origin> {
+        self.origins.get(number as usize).copied()
     }
 
     /// Values are numbered below this.

@@ -65,7 +65,7 @@ impl Live<'_> {
             if std::mem::replace(&mut self.alive[number as usize], true) {
                 continue;
             }
-            let Value { op, place } = &self.values[number as usize];
+            let Value { op, place, .. } = &self.values[number as usize];
             if let Op::Get(name) | Op::Count(name) = op {
                 self.names.insert(*name);
             }

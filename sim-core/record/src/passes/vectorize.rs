@@ -20,6 +20,7 @@ impl Recording {
             inputs: self.inputs,
             outputs: self.outputs.clone(),
             values,
+            origins: Vec::new(),
             names: self.names,
             scratch: self.scratch,
             lanes: self.lanes,

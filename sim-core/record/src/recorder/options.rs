@@ -19,6 +19,12 @@ impl Recorder {
         with(Location::caller(), |s| s.lanes = lanes);
     }
 
+    /// What is recorded from now on belongs to this part of the code, such as a stage: see [`Origin`](crate::Origin).
+    #[track_caller]
+    pub fn begin_part(&mut self, name: &'static str) {
+        with(Location::caller(), |s| s.part = name);
+    }
+
     /// From now on, whatever the code asks about outside of blocks and loops ([`Cx::anywhere`]) holds in no world: the
     /// recording is good where [`Recording::assumed`] holds nowhere.
     ///

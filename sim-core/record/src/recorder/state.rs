@@ -51,6 +51,8 @@ pub(crate) struct Scope {
 pub(crate) struct Value {
     pub op: Op,
     pub place: Place,
+    /// The part of the code that it belongs to.
+    pub part: &'static str,
 }
 
 pub(crate) struct State {
@@ -72,6 +74,8 @@ pub(crate) struct State {
     error: Option<RecordError>,
     /// Location of the present operation in the code.
     place: Place,
+    /// The part of the code that is recorded now.
+    pub part: &'static str,
 }
 
 thread_local! {
@@ -97,6 +101,7 @@ impl Session {
             owners: HashMap::new(),
             error: None,
             place,
+            part: "",
         };
         state.enter(Kind::Whole);
         Session(STATE.with(|s| s.replace(Some(state))))
@@ -240,6 +245,7 @@ impl State {
         self.values.push(Value {
             op: Op::Input(i),
             place: self.place,
+            part: self.part,
         });
         Operand::Value(self.values.len() as u32 - 1)
     }
@@ -278,6 +284,7 @@ impl State {
         self.values.push(Value {
             op,
             place: self.place,
+            part: self.part,
         });
         self.emit(Statement::Let(number));
         Operand::Value(number)

@@ -276,6 +276,7 @@ fn kernel(plan: &Plan<'_>, p: usize, options: &ProgramOptions) -> Kernel {
         inputs: inputs.len(),
         outputs: results,
         values: writer.values,
+        origins: Vec::new(),
         names: plan.recording.names,
         scratch: 0,
         lanes: 1,

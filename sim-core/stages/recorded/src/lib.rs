@@ -7,9 +7,9 @@ use sim_physics::arrays::{Array, Block, Flat, Writer};
 use sim_physics::constants::Constants;
 use sim_physics::every_stage;
 use sim_physics::lane::{Cx, Num};
-use sim_physics::schedule::step_stages;
 use sim_physics::step::{Stage, StageId};
 use sim_record::{RecordError, Recorded, RecordedVariable, Recorder, Recording, record};
+use std::ops::Range;
 
 /// A block of the backend that records.
 pub type RecordedWorlds = Block<Recorded, RecordedVariable>;
@@ -17,6 +17,7 @@ pub type RecordedWorlds = Block<Recorded, RecordedVariable>;
 /// Records a stage.
 pub fn run(stage: StageId, cx: &mut Recorder, m: &Constants<f32>, block: &mut RecordedWorlds) {
     static STAGES: [RunStage; StageId::COUNT] = every_stage!(stage_functions(recorded));
+    cx.begin_part(stage.name());
     STAGES[stage.index()](cx, m, block);
 }
 
@@ -26,44 +27,58 @@ fn recorded<S: Stage>(cx: &mut Recorder, m: &Constants<f32>, block: &mut Recorde
     S::run(cx, m, block);
 }
 
-/// A recorded substep, with the arrays of its inputs and of its outputs, in order.
-pub struct Substep {
-    /// All stages.
+/// Recorded stages of a substep that follow each other, with the arrays of their inputs and of their outputs, in order.
+pub struct StageRun {
+    /// All of them.
     pub recording: Recording,
     /// What its inputs are.
     pub reads: Vec<Array>,
-    /// What its outputs are: what outlasts a substep.
+    /// What its outputs are: what outlasts the substep, and what other stages read before they write it.
     pub writes: Vec<Array>,
 }
 
-impl Substep {
-    /// Records the substep of a model; on assumptions, see [`Recorder::assume_nowhere`].
+impl StageRun {
+    /// Records the stages in `run`, places among all those of a substep; on assumptions, see [`Recorder::assume_nowhere`].
     ///
     /// # Errors
     /// As [`record`].
-    pub fn record(m: &Constants<f32>, assumes: bool) -> Result<Substep, RecordError> {
-        let stages = step_stages(m);
-        let (mut reads, _) = effects(&stages);
-        let writes = kept();
-        // what is not written keeps its value
-        let kept = writes.iter().filter(|array| !reads.contains(array));
-        let kept: Vec<Array> = kept.copied().collect();
-        reads.extend(kept);
+    pub fn record(
+        m: &Constants<f32>,
+        substep: &[StageId],
+        run: Range<usize>,
+        assumes: bool,
+    ) -> Result<StageRun, RecordError> {
+        let stages = &substep[run.clone()];
+        let kept = kept();
+        let (reads, mut writes) = effects(stages);
+        // in the order in which they follow, into the next substep
+        let others = [&substep[run.end..], &substep[..run.start]].concat();
+        writes.retain(|array| kept.contains(array) || is_read_first(*array, &others));
         let recording = between(m, &reads, &writes, |cx, block| {
             if assumes {
                 cx.assume_nowhere();
             }
             for stage in stages {
-                run(stage, cx, m, block);
+                self::run(*stage, cx, m, block);
             }
             Vec::new()
         })?;
-        Ok(Substep {
+        Ok(StageRun {
             recording,
             reads,
             writes,
         })
     }
+}
+
+/// Do stages read an array before one writes all of it?
+fn is_read_first(array: Array, stages: &[StageId]) -> bool {
+    let meets = |stage: &&StageId| {
+        let mut arrays = stage.reads().iter().chain(stage.writes());
+        arrays.any(|other| *other == array)
+    };
+    let first = stages.iter().find(meets);
+    first.is_some_and(|stage| stage.reads().contains(&array))
 }
 
 /// What outlasts a substep.

@@ -141,6 +141,11 @@ impl<F: Lane> Backend for Cpu<F> {
         Some(self.job.compiled.as_ref()?.sizes())
     }
 
+    fn code_pieces(&self) -> Vec<(usize, usize, &'static str)> {
+        let compiled = self.job.compiled.iter();
+        compiled.flat_map(|step| step.pieces()).collect()
+    }
+
     fn set_faults(&mut self, faults: Faults) {
         self.job.faults = faults;
     }

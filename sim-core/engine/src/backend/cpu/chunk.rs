@@ -39,7 +39,7 @@ pub(super) struct Job<F: Lane> {
     pub layout: Layout,
     /// Stages of a step that the model needs, by their places.
     pub step: Vec<usize>,
-    /// The substep as machine code, where the model is compiled.
+    /// What of the substep is machine code, where the model is compiled.
     pub compiled: Option<Arc<CompiledStep>>,
     /// Stages that evaluate the fields of the layout.
     pub evaluate: Vec<usize>,
@@ -148,9 +148,9 @@ pub(super) struct Chunk<F: Lane> {
     pub(super) spaces: Vec<Option<Space<F>>>,
     /// The place of the block at work in its cluster.
     pub(super) at_work: usize,
-    /// For how many substeps each block assumes nothing, see [`CompiledStep::run`].
-    pub(super) wary: Vec<u8>,
-    /// Memory of the compiled substep.
+    /// For how many substeps each block assumes nothing, by section of the compiled substep: see [`super::compiled::Section::run`].
+    pub(super) wary: Vec<Vec<u8>>,
+    /// Memory of the compiled sections.
     pub(super) compiled_scratch: Vec<F>,
     /// Blocks of worlds from the cluster; none where blocks are by themselves.
     pub(super) gathering: Option<Gathering<F>>,
@@ -174,15 +174,13 @@ impl<F: Lane> Chunk<F> {
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
         let cluster = match job.pauses {
-            // a compiled substep does not pause
-            Some(_) if job.compiled.is_none() => {
-                cluster_size(&job.constants, blocks, size_of::<F>())
-            }
-            _ => 1,
+            Some(_) => cluster_size(&job.constants, blocks, size_of::<F>()),
+            None => 1,
         };
         let Space { block, memory } = Space::new(&job.constants);
         let mut spaces = vec![None];
         spaces.extend((1..cluster).map(|_| Some(Space::new(&job.constants))));
+        let compiled = job.compiled.as_deref();
         let mut chunk = Chunk {
             state: vec![F::Real::default(); blocks * job.shape.total() * F::WIDTH],
             steps: vec![0; worlds.len()],
@@ -196,8 +194,8 @@ impl<F: Lane> Chunk<F> {
             memory,
             spaces,
             at_work: 0,
-            wary: vec![0; blocks],
-            compiled_scratch: vec![F::default(); job.compiled.as_ref().map_or(0, |c| c.scratch())],
+            wary: vec![vec![0; blocks]; compiled.map_or(0, |step| step.sections())],
+            compiled_scratch: vec![F::default(); compiled.map_or(0, |step| step.scratch())],
             gathering: (cluster > 1).then(|| Gathering::new(&job.constants)),
             kept: vec![F::default(); job.constants.dofs.len()],
             staging: vec![F::default(); elements],

@@ -2,7 +2,7 @@
 
 use super::backend::{CompiledStages, Cpu, Workers};
 use super::chunk::{Chunk, Job};
-use super::compiled::CompiledStep;
+use super::compiled::{CompiledStep, StagesOfModel};
 use super::transfer::Arena;
 use crate::backend::{
     Backend, BackendError, Backends, Groups, Lanes, OutputsAt, Precision, Profile,
@@ -34,6 +34,17 @@ compiled!(
     lowest
 );
 
+/// How worlds run on the CPU.
+#[derive(Clone, Copy)]
+pub(crate) struct CpuOptions<'a> {
+    /// Threads of a step.
+    pub threads: usize,
+    /// Whether models run as machine code of their own.
+    pub compiles: bool,
+    /// The model with whose stages that is compared first, if any.
+    pub checked_with: Option<&'a Model>,
+}
+
 /// Whether this processor runs blocks of this width.
 pub fn available(lanes: Lanes) -> bool {
     let widths = widths();
@@ -48,13 +59,13 @@ pub fn available(lanes: Lanes) -> bool {
 ///
 /// # Errors
 /// [`BackendError::Lanes`] for a width that the processor does not support, [`BackendError::Threads`].
-pub fn create(
+pub(crate) fn create(
     model: &Model,
     groups: Groups,
     precision: Precision,
     lanes: Lanes,
     layout: (&Layout, OutputsAt),
-    threads_and_compiles: (usize, bool),
+    options: CpuOptions<'_>,
 ) -> Result<Backends, BackendError> {
     let lanes = match lanes {
         // one world in a SIMD register is slower than a scalar, with the same bits
@@ -78,7 +89,7 @@ pub fn create(
     match (precision, lanes) {
         (Precision::F64, _) => {
             let compiled = baseline("f64 scalar, FMA", stages_f64::STAGES);
-            boxed(model, groups, layout, threads_and_compiles, compiled)
+            boxed(model, groups, layout, options, compiled)
         }
         #[cfg(target_arch = "x86_64")]
         (Precision::F32, Lanes::Sixteen) => {
@@ -87,16 +98,16 @@ pub fn create(
                 stages: stages_f32x16::STAGES,
                 chunk: avx512,
             };
-            boxed(model, groups, layout, threads_and_compiles, compiled)
+            boxed(model, groups, layout, options, compiled)
         }
         #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
         (Precision::F32, Lanes::Eight) => {
             let compiled = baseline(EIGHT, stages_f32x8::STAGES);
-            boxed(model, groups, layout, threads_and_compiles, compiled)
+            boxed(model, groups, layout, options, compiled)
         }
         (Precision::F32, _) => {
             let compiled = baseline("f32 scalar, FMA", stages_f32::STAGES);
-            boxed(model, groups, layout, threads_and_compiles, compiled)
+            boxed(model, groups, layout, options, compiled)
         }
     }
 }
@@ -114,34 +125,51 @@ fn boxed<F: Lane>(
     model: &Model,
     groups: Groups,
     (layout, outputs_at): (&Layout, OutputsAt),
-    (threads, compiles): (usize, bool),
+    options: CpuOptions<'_>,
     stages: CompiledStages<F>,
 ) -> Result<Backends, BackendError> {
     // a substep whose stages are shown runs as stages
     let shows_all = outputs_at == OutputsAt::LastSubstep && model.substeps() == 1;
-    let compiled = match compiles && !shows_all {
+    let made = match options.compiles && !shows_all {
         true => CompiledStep::of_model::<F>(model),
         false => Ok(None),
     };
+    let job = |model, compiled, numbering| {
+        let layout = (layout.clone(), outputs_at);
+        Job::new(model, layout, stages.stages, compiled, numbering)
+    };
+    let compiled = match (made, options.checked_with) {
+        (Ok(Some(step)), Some(model)) => {
+            let job = job(model, None, groups.numbering);
+            let of_stages = StagesOfModel {
+                constants: &job.constants,
+                stages: &job.stages,
+                step: &job.step,
+                start: &job.start,
+            };
+            // SAFETY: this processor has the instructions of the stages, which `create` chose for their scalars.
+            let checked = unsafe { step.check(&of_stages) };
+            checked.map(|()| Some(step))
+        }
+        (made, _) => made,
+    };
+    let checked = match options.checked_with {
+        Some(_) => " (checked)",
+        None => "",
+    };
     let note = match &compiled {
-        Ok(Some(_)) => ", machine code".to_owned(),
+        Ok(Some(step)) if step.is_whole() => format!(", machine code{checked}"),
+        Ok(Some(_)) => format!(", machine code but for contacts and solver{checked}"),
         Ok(None) => String::new(),
         Err(error) => format!(", stages only: {error}"),
     };
     let compiled = compiled.ok().flatten().map(Arc::new);
     // one thread per block is enough
-    let threads = threads.min(groups.count * groups.worlds.div_ceil(F::WIDTH));
+    let threads = (options.threads).min(groups.count * groups.worlds.div_ceil(F::WIDTH));
     let workers = Workers::new(threads, groups.count)?;
     let made = groups.numberings().map(|numbering| {
-        let job = Job::new(
-            model,
-            (layout.clone(), outputs_at),
-            stages.stages,
-            compiled.clone(),
-            numbering,
-        );
         let cpu = Cpu::new(
-            job,
+            job(model, compiled.clone(), numbering),
             groups.worlds,
             threads,
             workers.clone(),

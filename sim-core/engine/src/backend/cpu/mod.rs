@@ -35,5 +35,7 @@ mod space;
 mod transfer;
 
 pub(crate) use backend::CHUNKS_PER_THREAD;
-pub use dispatch::{available, create};
+pub use compiled::{ProgramListing, SectionListing, listing};
+pub use dispatch::available;
+pub(crate) use dispatch::{CpuOptions, create};
 pub(crate) use gathered::spaces_max;

@@ -1,6 +1,7 @@
 //! A control frame of a chunk: all substeps of a cluster of blocks in cache, then its outputs.
 
 use super::chunk::{Chunk, Job};
+use super::compiled::Section;
 use super::contacts;
 use super::gathered::few;
 use super::probe::{Moment, Probe, Watch};
@@ -135,8 +136,8 @@ impl<F: Lane> Chunk<F> {
         block * stride..(block + 1) * stride
     }
 
-    /// Runs a substep of a cluster of blocks: as machine code, unless its stages are watched or evaluated. Of the last one it writes
-    /// the fields that belong to it to the arena.
+    /// Runs a substep of a cluster of blocks: stages that are compiled as machine code, unless they are watched or evaluated. Of the
+    /// last one it writes the fields that belong to it to the arena.
     ///
     /// # Safety
     /// As [`Chunk::run`].
@@ -149,15 +150,10 @@ impl<F: Lane> Chunk<F> {
         probe: &mut P,
     ) {
         let shows = last.is_some() && job.evaluate_last.is_some();
-        if let (false, false, Some(compiled)) = (P::WATCHES, shows, &job.compiled) {
-            for (k, block) in blocks.enumerate() {
-                self.enter(k);
-                let (scratch, wary) = (&mut self.compiled_scratch, &mut self.wary[block]);
-                // SAFETY: by contract; it was compiled for registers of `F` and the model of the job.
-                unsafe { compiled.run(&mut self.block, scratch, wary) };
-            }
-            return;
-        }
+        let compiled = match P::WATCHES || shows {
+            true => None,
+            false => job.compiled.as_deref(),
+        };
         if shows {
             for k in 0..blocks.len() {
                 self.enter(k);
@@ -176,9 +172,20 @@ impl<F: Lane> Chunk<F> {
             };
             for (k, block) in blocks.clone().enumerate() {
                 self.enter(k);
-                for (place, &stage) in (begin..end).zip(&stages[begin..end]) {
+                let mut place = begin;
+                while place < end {
+                    if let Some((number, section)) =
+                        compiled.and_then(|step| step.section_at(place))
+                    {
+                        // SAFETY: by contract; it was compiled for registers of `F` and the model of the job.
+                        unsafe { self.run_section(number, section, block) };
+                        place += section.stages();
+                        continue;
+                    }
+                    let stage = stages[place];
+                    place += 1;
                     // the last stage goes to the next state
-                    if let (Some(arena), true) = (last, place + 1 == stages.len()) {
+                    if let (Some(arena), true) = (last, place == stages.len()) {
                         // SAFETY: by contract.
                         unsafe { self.evaluate_last(job, block, arena, probe) };
                     }
@@ -253,6 +260,18 @@ impl<F: Lane> Chunk<F> {
         // SAFETY: the arena holds the layout.
         unsafe { self.put_fields(job, block, arena, |field| !(lags && field.lags())) };
         probe.after_part(Part::Fields);
+    }
+
+    /// Runs the stages of a compiled section, by its number.
+    ///
+    /// # Safety
+    /// The processor has the instructions of the section, which is of the job's model.
+    #[inline(always)]
+    unsafe fn run_section(&mut self, number: usize, section: &Section, block: usize) {
+        let at_work = (&mut *self.block, &mut self.memory[..]);
+        let wary = &mut self.wary[number][block];
+        // SAFETY: by contract.
+        unsafe { section.run(at_work, &mut self.compiled_scratch, wary) };
     }
 
     /// Runs a stage.

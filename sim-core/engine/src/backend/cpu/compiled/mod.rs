@@ -1,52 +1,53 @@
-//! The substep of a model as machine code, where the model can be compiled.
+//! Stages of a substep as machine code, where the model can be compiled: all of them without contacts, else those before contacts
+//! are found, and the integrator.
 //!
-//! It has the bits of the stages. Where nothing rare happens in a block, a shorter program runs: no joint is at a limit.
+//! The code has the bits of the stages.
 
+mod check;
+mod listing;
+mod section;
 mod stack;
 mod suits;
 
-use sim_compile::{Address, Program, Size, Target};
+pub(super) use check::StagesOfModel;
+pub use listing::{ProgramListing, SectionListing, listing};
+use section::RecordedSection;
+pub(super) use section::Section;
+use sim_compile::{Size, Target};
 use sim_model::Model;
-use sim_physics::arrays::{Array, Block, Flat};
 use sim_physics::constants::Constants;
 use sim_physics::lane::{Lane, Real};
+use sim_physics::schedule::step_stages;
+use sim_physics::step::StageId;
 use stack::with_stack;
-use stages_recorded::Substep;
-use suits::suits;
+use suits::{runs, suits};
 
-/// Most arrays that a substep reads and writes.
-const ARRAYS_MAX: usize = 64;
-/// Substeps of a block after a rare one for which nothing is assumed: what is rare may last.
-const WARY: u8 = 16;
-
-/// All stages of a substep.
+/// What of a substep is machine code.
 pub(super) struct CompiledStep {
-    /// Assumes that nothing rare happens; none where nothing rare can.
-    usual: Option<Program>,
-    /// Assumes nothing.
-    full: Program,
-    /// In the order of the programs' addresses.
-    arrays: Vec<Array>,
+    sections: Vec<Section>,
+    /// By place of a stage in a substep: the section that begins there.
+    beginning: Vec<Option<usize>>,
+    /// See [`check::sizes_of_arrays`].
+    sizes_of_arrays: Vec<usize>,
 }
 
 /// Why a model has no machine code that should have it, for people.
 pub(super) type Refusal = String;
 
 impl CompiledStep {
-    /// The substep of a model for registers of `F`; none where the stages run: in double precision, for one world in a block,
-    /// with contacts, and for a kind of processor without a compiler.
+    /// What of the model's substep is compiled for registers of `F`; none where the stages run: in double precision, for one world
+    /// in a block, and for a kind of processor without a compiler.
     ///
     /// # Errors
     /// A recorded operation that the compiler does not know, or a system that forbids machine code.
     pub fn of_model<F: Lane>(model: &Model) -> Result<Option<CompiledStep>, Refusal> {
-        let m = model.constants();
         let target = match F::Real::DOUBLE {
             true => None,
             false => Target::of_width(F::WIDTH),
         };
         match target {
-            Some(target) if suits(m) => {
-                let m = m.cast();
+            Some(target) if suits(model.constants()) => {
+                let m = model.constants().cast();
                 with_stack(|| CompiledStep::new(&m, target)).map(Some)
             }
             _ => Ok(None),
@@ -54,77 +55,66 @@ impl CompiledStep {
     }
 
     fn new(m: &Constants<f32>, target: Target) -> Result<CompiledStep, Refusal> {
-        let record = |assumes| Substep::record(m, assumes).map_err(|error| error.to_string());
-        let (usual, full) = (record(true)?, record(false)?);
-        let mut arrays: Vec<Array> = Vec::new();
-        for array in full.reads.iter().chain(&full.writes) {
-            if !arrays.contains(array) {
-                arrays.push(*array);
-            }
+        let substep = step_stages(m);
+        let mut step = CompiledStep {
+            sections: Vec::new(),
+            beginning: vec![None; substep.len()],
+            sizes_of_arrays: check::sizes_of_arrays(m),
+        };
+        for run in runs(m, &substep) {
+            // a block pauses at the end of a run of stages, never in it
+            let pauses = |stage: &StageId| !stage.resumes().is_empty();
+            let has_contacts = !m.contacts.classes.is_empty();
+            assert!(!(has_contacts && substep[run.clone()].iter().any(pauses)));
+            step.beginning[run.start] = Some(step.sections.len());
+            let recorded = RecordedSection::new(m, &substep, run)?;
+            step.sections
+                .push(recorded.compiled(&m.contacts.tables, target)?);
         }
-        assert!(arrays.len() <= ARRAYS_MAX, "more arrays than places");
-        let place = |array: &Array| arrays.iter().position(|other| other == array);
-        let addresses = |listed: &[Array]| -> Vec<Address> {
-            let each = listed.iter().flat_map(|array| {
-                let place = place(array).expect("it is listed") as u32;
-                let registers = 0..array.scalars(m) as u32;
-                registers.map(move |at| Address { array: place, at })
-            });
-            each.collect()
-        };
-        let (inputs, outputs) = (addresses(&full.reads), addresses(&full.writes));
-        let tables = &m.contacts.tables;
-        let compiled = |step: &Substep| {
-            let made = Program::new(&step.recording, &inputs, &outputs, tables, target);
-            made.map_err(|error| error.to_string())
-        };
-        let assumes = usual.recording.assumed().is_some();
-        Ok(CompiledStep {
-            usual: assumes.then(|| compiled(&usual)).transpose()?,
-            full: compiled(&full)?,
-            arrays,
-        })
+        Ok(step)
     }
 
-    fn programs(&self) -> [&Program; 2] {
-        [self.usual.as_ref().unwrap_or(&self.full), &self.full]
+    /// Is all of the substep machine code?
+    pub fn is_whole(&self) -> bool {
+        matches!(&self.sections[..], [section] if section.stages() == self.beginning.len())
     }
 
-    /// Memory that [`CompiledStep::run`] needs, in registers.
-    pub fn scratch(&self) -> usize {
-        let [usual, full] = self.programs().map(Program::scratch);
-        usual.max(full)
+    /// How many sections it has.
+    pub fn sections(&self) -> usize {
+        self.sections.len()
     }
 
-    /// Sizes of the programs: of that which assumes, and of the other.
-    pub fn sizes(&self) -> [Size; 2] {
-        self.programs().map(Program::size)
-    }
-
-    /// Runs the substep on a block. `wary` is the block's, 0 at first: for how many substeps nothing is assumed.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `F`, for which the step was compiled, and the block is of its model.
+    /// The section that begins with the stage at this place of a substep, and its number.
     #[inline(always)]
-    pub unsafe fn run<F: Lane>(&self, block: &mut Block<F, F>, scratch: &mut [F], wary: &mut u8) {
-        assert!(scratch.len() >= self.scratch(), "memory for both programs");
-        let mut places = [std::ptr::null_mut::<f32>(); ARRAYS_MAX];
-        for (place, array) in places.iter_mut().zip(&self.arrays) {
-            let (Flat::Cells(x) | Flat::Values(x)) = block.array_mut(*array);
-            *place = x.as_mut_ptr().cast();
-        }
-        let places = &places[..self.arrays.len()];
-        let scratch = scratch.as_mut_ptr().cast();
-        if let (Some(usual), 0) = (&self.usual, *wary) {
-            // SAFETY: by contract; the arrays are those for which the programs were made, and this block's alone.
-            if unsafe { usual.run(places, scratch) } {
-                return;
-            }
-            *wary = WARY;
-        }
-        *wary = wary.saturating_sub(1);
-        // SAFETY: as above.
-        let done = unsafe { self.full.run(places, scratch) };
-        assert!(done, "it assumes nothing");
+    pub fn section_at(&self, place: usize) -> Option<(usize, &Section)> {
+        let number = self.beginning[place]?;
+        Some((number, &self.sections[number]))
+    }
+
+    /// Memory that a section needs, in registers.
+    pub fn scratch(&self) -> usize {
+        self.sections
+            .iter()
+            .map(Section::scratch)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Where the stages are in memory: address, bytes and name of each piece.
+    pub fn pieces(&self) -> impl Iterator<Item = (usize, usize, &'static str)> {
+        self.sections.iter().flat_map(Section::pieces)
+    }
+
+    /// Sizes of the programs of all sections: of those that assume, and of the others.
+    pub fn sizes(&self) -> [Size; 2] {
+        let add = |all: Size, more: Size| Size {
+            bytes: all.bytes + more.bytes,
+            instructions: all.instructions + more.instructions,
+            spills: all.spills + more.spills,
+            slots: all.slots.max(more.slots),
+        };
+        let sizes = self.sections.iter().map(Section::sizes);
+        let all = sizes.reduce(|all, more| [add(all[0], more[0]), add(all[1], more[1])]);
+        all.expect("a step has a section")
     }
 }

@@ -1,21 +1,61 @@
-//! Which models are compiled.
+//! Which models are compiled, and which of their stages.
 
+use sim_physics::arrays::Array;
 use sim_physics::constants::Constants;
 use sim_physics::schedule::step_stages;
+use sim_physics::step::StageId;
+use std::ops::Range;
 
 /// Most entries of the mass matrix of a model that is compiled: its factor is written out, and that of a chain of 34 dofs is a
 /// hundred thousand bytes of code [–].
 const ENTRIES_MAX: usize = 600;
-/// Most dofs, bodies, rows of joints and actuators together, times the evaluations of its forces in a substep: the code of larger
-/// models fits no cache, and takes long to make [–].
+/// Most parts of a model without contacts, times the evaluations of its forces in a substep: the code of larger models fits no
+/// cache, and takes long to make [–].
 const PARTS_MAX: usize = 384;
+/// The same of a model with contacts, of which less is compiled. A Franka arm is 11 % faster by it, a humanoid no faster [–].
+const TOUCHING_PARTS_MAX: usize = 72;
 
-/// Is it a model without contacts, of a size for which machine code pays?
+/// Contacts as they are found. Their number differs from world to world, and no program has been made for that.
+const OF_CONTACTS: [Array; 3] = [
+    Array::ContactPoints,
+    Array::ContactRows,
+    Array::ContactForces,
+];
+
+/// Is it a model of a size for which machine code pays?
 pub(super) fn suits(m: &Constants<f64>) -> bool {
-    let parts = m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len();
     let stages = step_stages(m);
     let evaluations = stages.iter().filter(|stage| stage.name() == "kinematics");
-    m.contacts.groups.is_empty()
-        && m.pattern.len() <= ENTRIES_MAX
-        && parts * evaluations.count() <= PARTS_MAX
+    let parts_max = match m.contacts.groups.is_empty() {
+        true => PARTS_MAX,
+        false => TOUCHING_PARTS_MAX,
+    };
+    m.pattern.len() <= ENTRIES_MAX && parts(m) * evaluations.count() <= parts_max
+}
+
+/// Dofs, bodies, rows of joints, actuators, and commands that wait in each dof.
+fn parts(m: &Constants<f64>) -> usize {
+    let commands = m.delay.frames * m.dofs.len();
+    m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len() + commands
+}
+
+/// Runs of stages that are compiled, as long as they can be, by their places in a substep.
+pub(super) fn runs(m: &Constants<f32>, substep: &[StageId]) -> Vec<Range<usize>> {
+    let is_compiled =
+        |place: &usize| m.contacts.groups.is_empty() || !meets_contacts(substep[*place]);
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for place in (0..substep.len()).filter(is_compiled) {
+        match runs.last_mut() {
+            Some(run) if run.end == place => run.end = place + 1,
+            _ => runs.push(place..place + 1),
+        }
+    }
+    runs
+}
+
+/// Does a stage find contacts, or read lists of them? The one that places shapes is no faster as machine code. The integrator
+/// reads how many there are, which no list is needed for.
+fn meets_contacts(stage: StageId) -> bool {
+    let mut arrays = stage.reads().iter().chain(stage.writes());
+    arrays.any(|array| OF_CONTACTS.contains(array))
 }
