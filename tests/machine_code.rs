@@ -225,20 +225,28 @@ fn on_the_ground() -> Arc<Model> {
     scene.compile().unwrap()
 }
 
+/// The arm, alone and where it may touch the ground and itself, with every width.
+fn arms() -> Vec<(Arc<Model>, Lanes)> {
+    let models = [lesson(Demo::Torque).compile().unwrap(), on_the_ground()];
+    let with_widths = |model: Arc<Model>| {
+        let each = widths()
+            .into_iter()
+            .map(move |lanes| (model.clone(), lanes));
+        each.collect::<Vec<_>>()
+    };
+    models.into_iter().flat_map(with_widths).collect()
+}
+
 #[test]
 fn outputs_of_the_last_substep_have_the_bits_of_the_stages() {
-    let models = [lesson(Demo::Torque).compile().unwrap(), on_the_ground()];
-    let all = models
-        .iter()
-        .flat_map(|model| widths().into_iter().map(move |lanes| (model, lanes)));
-    for (model, lanes) in all {
+    for (model, lanes) in arms() {
         let [stages, code] = [false, true].map(|compiles| {
             let options = Options {
                 outputs_at: OutputsAt::LastSubstep,
                 fields: LAGGING.to_vec(),
                 ..options(lanes, compiles)
             };
-            frames(model, options)
+            frames(&model, options)
         });
         assert!(stages == code, "{lanes:?}");
     }
@@ -246,12 +254,8 @@ fn outputs_of_the_last_substep_have_the_bits_of_the_stages() {
 
 #[test]
 fn a_world_that_is_not_finite_is_frozen_alone() {
-    let models = [lesson(Demo::Torque).compile().unwrap(), on_the_ground()];
-    let all = models
-        .iter()
-        .flat_map(|model| widths().into_iter().map(move |lanes| (model, lanes)));
-    for (model, lanes) in all {
-        let mut run = Run::new(model, options(lanes, true));
+    for (model, lanes) in arms() {
+        let mut run = Run::new(&model, options(lanes, true));
         let mut torques = vec![0.0; WORLDS * 9];
         torques[5 * 9 + 3] = 1e38;
         (run.sim.command(Field::JointF, 0..9, Values::F64(&torques))).unwrap();

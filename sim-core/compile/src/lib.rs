@@ -103,7 +103,7 @@ impl Program {
         Ok(Program {
             pages: Pages::new(&encoded.bytes, &encoded.constants)?,
             size,
-            parts: listing::parts(recording, &made.code, allocated, encoded),
+            parts: listing::parts((recording, &made.code), (allocated, encoded)),
         })
     }
 
@@ -121,12 +121,8 @@ impl Program {
         target: Target,
     ) -> Result<Vec<Line>, CompileError> {
         let made = Compiled::new(recording, places, tables, target, true)?;
-        Ok(listing::lines(
-            recording,
-            &made.code,
-            &made.allocated,
-            &made.encoded,
-        ))
+        let recorded = (recording, &made.code);
+        Ok(listing::lines(recorded, (&made.allocated, &made.encoded)))
     }
 
     /// How large it is.
@@ -143,7 +139,7 @@ impl Program {
     pub fn parts(&self) -> impl Iterator<Item = (usize, usize, &'static str)> {
         let first = self.pages.address() as usize;
         let parts = self.parts.iter();
-        parts.map(move |part| (first + part.start, part.bytes, part.part))
+        parts.map(move |(part, range)| (first + range.start, range.len(), *part))
     }
 
     /// Runs it on the arrays of a block, in memory of [`Program::scratch`] registers. False if something holds that the recording

@@ -4,6 +4,7 @@ use crate::allocate::Allocated;
 use crate::code::Code;
 use crate::x86::Encoded;
 use sim_record::{Origin, Recording};
+use std::ops::Range;
 
 /// The part of a program that begins and ends it, and what was not computed by the code itself.
 const EDGES: &str = "entry and exit";
@@ -31,88 +32,58 @@ pub struct Line {
     pub instructions: Vec<String>,
 }
 
-/// A run of bytes that come from one part of the code.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PartBytes {
-    pub part: &'static str,
-    pub start: usize,
-    pub bytes: usize,
-}
+/// Bytes that come from one part of the code.
+pub(crate) type PartBytes = (&'static str, Range<usize>);
 
-/// The origin of each machine instruction.
-fn origins<'a>(
-    recording: &'a Recording,
-    code: &'a Code,
-    allocated: &'a Allocated,
-) -> impl Iterator<Item = Option<Origin>> + 'a {
-    let sources = allocated.sources.iter();
-    sources.map(|at| recording.origin(code.sources[*at as usize]?))
+/// The bytes of a program by what its machine instructions come from: runs that have the same key, in order.
+fn runs<K: PartialEq>(
+    (recording, code): (&Recording, &Code),
+    (allocated, encoded): (&Allocated, &Encoded),
+    key: impl Fn(Option<Origin>) -> K,
+) -> Vec<(K, Range<usize>)> {
+    let end = encoded.bytes.len();
+    let mut runs = vec![(key(None), 0..end)];
+    for (at, start) in allocated.sources.iter().zip(&encoded.starts) {
+        let origin = code.sources[*at as usize].and_then(|value| recording.origin(value));
+        let (key, start) = (key(origin), *start as usize);
+        match runs.last_mut() {
+            Some((last, _)) if *last == key => {}
+            Some((_, range)) => {
+                range.end = start;
+                runs.push((key, start..end));
+            }
+            None => unreachable!("a program begins with a run"),
+        }
+    }
+    // labels have no bytes
+    runs.retain(|(_, range)| !range.is_empty());
+    runs
 }
 
 /// The bytes of a program by parts of the code.
-pub(crate) fn parts(
-    recording: &Recording,
-    code: &Code,
-    allocated: &Allocated,
-    encoded: &Encoded,
-) -> Vec<PartBytes> {
-    let mut parts: Vec<PartBytes> = Vec::new();
-    let begins = |part: &'static str, start: usize| PartBytes {
-        part,
-        start,
-        bytes: 0,
-    };
-    let mut open = begins(EDGES, 0);
-    let starts = encoded.starts.iter().map(|start| *start as usize);
-    for (origin, start) in origins(recording, code, allocated).zip(starts) {
-        let part = part(origin);
-        if part != open.part {
-            open.bytes = start - open.start;
-            parts.push(open);
-            open = begins(part, start);
-        }
-    }
-    open.bytes = encoded.bytes.len() - open.start;
-    parts.push(open);
-    parts
+pub(crate) fn parts(recorded: (&Recording, &Code), made: (&Allocated, &Encoded)) -> Vec<PartBytes> {
+    runs(recorded, made, part)
 }
 
 /// The lines of a program whose instructions were asked for.
-pub(crate) fn lines(
-    recording: &Recording,
-    code: &Code,
-    allocated: &Allocated,
-    encoded: &Encoded,
-) -> Vec<Line> {
-    let begins = |origin: Option<Origin>, start: usize| Line {
-        part: part(origin),
-        origin,
-        start,
-        bytes: 0,
-        instructions: Vec::new(),
+pub(crate) fn lines(recorded: (&Recording, &Code), made: (&Allocated, &Encoded)) -> Vec<Line> {
+    let (_, encoded) = made;
+    let mut rest = encoded.listing.iter().peekable();
+    let line = |(origin, range): (Option<Origin>, Range<usize>)| {
+        let mut instructions = Vec::new();
+        while let Some((_, text)) = rest.next_if(|(start, _)| (*start as usize) < range.end) {
+            instructions.push(text.clone());
+        }
+        Line {
+            part: part(origin),
+            origin,
+            start: range.start,
+            bytes: range.len(),
+            instructions,
+        }
     };
-    let mut lines = vec![begins(None, 0)];
-    let mut places = origins(recording, code, allocated)
-        .zip(&encoded.starts)
-        .peekable();
-    let mut origin = None;
-    for (start, instruction) in &encoded.listing {
-        while let Some((next, _)) = places.next_if(|(_, from)| *from <= start) {
-            origin = next;
-        }
-        let start = *start as usize;
-        if lines.last().is_none_or(|line| line.origin != origin) {
-            lines.push(begins(origin, start));
-        }
-        if let Some(line) = lines.last_mut() {
-            line.instructions.push(instruction.clone());
-        }
-    }
-    let ends: Vec<usize> = (lines.iter().skip(1).map(|line| line.start))
-        .chain([encoded.bytes.len()])
-        .collect();
-    for (line, end) in lines.iter_mut().zip(ends) {
-        line.bytes = end - line.start;
-    }
-    lines
+    runs(recorded, made, |origin| origin)
+        .into_iter()
+        .map(line)
+        .collect()
 }

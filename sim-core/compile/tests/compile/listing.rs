@@ -1,7 +1,7 @@
 //! Programs for people, and how long they may be.
 
-use super::{compiled, tables, targets};
-use sim_compile::{Address, CompileError, Places, Program};
+use super::{addresses, compiled, tables, targets};
+use sim_compile::{CompileError, Places, Program};
 use sim_physics::lane::{Cx, Num};
 use sim_physics::times;
 use sim_record::record;
@@ -35,10 +35,6 @@ fn a_listing_has_every_instruction_of_the_program() {
         vec![cx.get(&sum)]
     });
     let recording = recording.unwrap();
-    let addresses = |array, n| -> Vec<Address> {
-        let each = (0..n as u32).map(|at| Address { array, at });
-        each.collect()
-    };
     let places = Places {
         inputs: &addresses(0, 2),
         outputs: &addresses(1, 1),

@@ -28,11 +28,13 @@ fn targets() -> Vec<(Target, usize)> {
     here.map(|(target, width, _)| (target, width)).collect()
 }
 
+/// So many registers of an array, from the first on.
+fn addresses(array: u32, n: usize) -> Vec<Address> {
+    let each = (0..n as u32).map(|at| Address { array, at });
+    each.collect()
+}
+
 fn compiled(recording: &Recording, target: Target) -> Result<Program, CompileError> {
-    let addresses = |array, n| -> Vec<Address> {
-        let each = (0..n as u32).map(|at| Address { array, at });
-        each.collect()
-    };
     let places = Places {
         inputs: &addresses(0, recording.inputs()),
         outputs: &addresses(1, recording.outputs()),

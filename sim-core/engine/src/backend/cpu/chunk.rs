@@ -173,10 +173,8 @@ impl<F: Lane> Chunk<F> {
             .iter()
             .map(|slot| slot.shape[1..].iter().product());
         let elements: usize = elements.max().unwrap_or(1);
-        let cluster = match job.pauses {
-            Some(_) => cluster_size(&job.constants, blocks, size_of::<F>()),
-            None => 1,
-        };
+        let cluster =
+            (job.pauses).map_or(1, |_| cluster_size(&job.constants, blocks, size_of::<F>()));
         let Space { block, memory } = Space::new(&job.constants);
         let mut spaces = vec![None];
         spaces.extend((1..cluster).map(|_| Some(Space::new(&job.constants))));

@@ -1,9 +1,7 @@
 //! Machine code of a model for people.
 
-use super::Target;
-use super::section::RecordedSection;
-use super::stack::with_stack;
-use super::suits::{runs, suits};
+use super::suits::suits;
+use super::{Target, each_section};
 use sim_compile::Line;
 use sim_model::Model;
 use sim_physics::schedule::step_stages;
@@ -36,13 +34,10 @@ pub fn listing(model: &Model, worlds: usize) -> Result<Vec<SectionListing>, Stri
     };
     let m = model.constants().cast();
     let substep = step_stages(&m);
-    let listed = |run: Range<usize>| {
-        let stages = substep[run.clone()].iter().map(|stage| stage.name());
-        let recorded = RecordedSection::new(&m, &substep, run.clone())?;
-        Ok(SectionListing {
-            stages: stages.collect(),
-            programs: recorded.listed(&m.contacts.tables, target)?,
-        })
+    let listed = each_section(&m, |recorded| recorded.listed(&m.contacts.tables, target))?;
+    let section = |(run, programs): (Range<usize>, _)| SectionListing {
+        stages: substep[run].iter().map(|stage| stage.name()).collect(),
+        programs,
     };
-    with_stack(|| runs(&m, &substep).into_iter().map(listed).collect())
+    Ok(listed.into_iter().map(section).collect())
 }

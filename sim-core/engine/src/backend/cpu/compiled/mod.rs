@@ -20,6 +20,7 @@ use sim_physics::lane::{Lane, Real};
 use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
 use stack::with_stack;
+use std::ops::Range;
 use suits::{runs, suits};
 
 /// What of a substep is machine code.
@@ -45,33 +46,21 @@ impl CompiledStep {
             true => None,
             false => Target::of_width(F::WIDTH),
         };
-        match target {
-            Some(target) if suits(model.constants()) => {
-                let m = model.constants().cast();
-                with_stack(|| CompiledStep::new(&m, target)).map(Some)
-            }
-            _ => Ok(None),
-        }
-    }
-
-    fn new(m: &Constants<f32>, target: Target) -> Result<CompiledStep, Refusal> {
-        let substep = step_stages(m);
+        let Some(target) = target.filter(|_| suits(model.constants())) else {
+            return Ok(None);
+        };
+        let m = model.constants().cast();
+        let made = each_section(&m, |recorded| recorded.compiled(&m.contacts.tables, target))?;
         let mut step = CompiledStep {
             sections: Vec::new(),
-            beginning: vec![None; substep.len()],
-            sizes_of_arrays: check::sizes_of_arrays(m),
+            beginning: vec![None; step_stages(&m).len()],
+            sizes_of_arrays: check::sizes_of_arrays(&m),
         };
-        for run in runs(m, &substep) {
-            // a block pauses at the end of a run of stages, never in it
-            let pauses = |stage: &StageId| !stage.resumes().is_empty();
-            let has_contacts = !m.contacts.classes.is_empty();
-            assert!(!(has_contacts && substep[run.clone()].iter().any(pauses)));
+        for (run, section) in made {
             step.beginning[run.start] = Some(step.sections.len());
-            let recorded = RecordedSection::new(m, &substep, run)?;
-            step.sections
-                .push(recorded.compiled(&m.contacts.tables, target)?);
+            step.sections.push(section);
         }
-        Ok(step)
+        Ok(Some(step))
     }
 
     /// Is all of the substep machine code?
@@ -117,4 +106,21 @@ impl CompiledStep {
         let all = sizes.reduce(|all, more| [add(all[0], more[0]), add(all[1], more[1])]);
         all.expect("a step has a section")
     }
+}
+
+/// Records every section of a model and makes something of it, with the places of its stages in a substep.
+fn each_section<T: Send>(
+    m: &Constants<f32>,
+    make: impl Fn(RecordedSection) -> Result<T, Refusal> + Sync,
+) -> Result<Vec<(Range<usize>, T)>, Refusal> {
+    let substep = step_stages(m);
+    let made = |run: Range<usize>| {
+        // a block pauses at the end of a run of stages, never in it
+        let pauses = |stage: &StageId| !stage.resumes().is_empty();
+        let has_contacts = !m.contacts.classes.is_empty();
+        assert!(!(has_contacts && substep[run.clone()].iter().any(pauses)));
+        let recorded = RecordedSection::new(m, &substep, run.clone())?;
+        Ok((run, make(recorded)?))
+    };
+    with_stack(|| runs(m, &substep).into_iter().map(made).collect())
 }
