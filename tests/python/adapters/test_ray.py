@@ -10,14 +10,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from same_bits import assert_same_bits, assert_same_steps
 
-from processes import alive, wait_until
+from processes import alive, children_of, command_of, wait_until
 
 # no report of use leaves the machine, and no package is sent to workers of the same one
 os.environ |= {
@@ -91,19 +90,14 @@ def pids_of(env: RayVectorEnv) -> list[int]:
     return [ray.get(actor.pid.remote()) for actor in fleet._actors]
 
 
-def children(pid: int) -> list[int]:
-    """Return the processes that a process has started."""
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
 def descendants(pid: int) -> list[int]:
     """Return the processes that a process and its descendants have started."""
-    return [found for child in children(pid) for found in (child, *descendants(child))]
+    return [found for child in children_of(pid) for found in (child, *descendants(child))]
 
 
 def daemons_of(pid: int) -> list[int]:
     """Return the daemons among a process's descendants."""
-    lines = {child: Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0") for child in descendants(pid)}
+    lines = {child: command_of(child) for child in descendants(pid)}
     return [child for child, words in lines.items() if b"serve" in words and any(b"tightloop" in w for w in words)]
 
 

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,7 +16,7 @@ import pytest
 
 import tightloop as tl
 from conftest import URDF
-from processes import alive, started, wait_until
+from processes import alive, children_of, started, wait_until
 from tiers import sweep
 
 # From a request to the end of the daemon, whatever it does [s]
@@ -99,18 +99,15 @@ sim.ik(tl.Reach("arm/fr3_hand_tcp")).solve((9, 9, 9), (1, 0, 0, 0), iterations=1
 }
 
 
-def processes_of(parent: int) -> list[int]:
-    """Return the processes that a process started and that run."""
-    found: list[str] = []
-    for task in Path(f"/proc/{parent}/task").iterdir():
-        found += (task / "children").read_text().split()
-    return [int(pid) for pid in found]
-
-
 def shared_folders(root: Path) -> list[Path]:
     """Return the folders of this root's daemons in shared memory."""
-    places = Path("/dev/shm").glob("tl*/place")
-    return [place.parent for place in places if place.read_text().startswith(f"{root}\n")]
+    found: list[Path] = []
+    for place in Path("/dev/shm").glob("tl*/place"):
+        # daemons of other tests come and go
+        with suppress(FileNotFoundError):
+            if place.read_text().startswith(f"{root}\n"):
+                found.append(place.parent)
+    return found
 
 
 @contextmanager
@@ -132,9 +129,15 @@ def at_work(work: str, name: str) -> Iterator[tuple[subprocess.Popen[str], int]]
     ):
         assert owner.stdout is not None
         assert owner.stdout.readline() == "ready\n"
-        assert wait_until(lambda: bool(processes_of(owner.pid)), 10.0)
+        children: list[int] = []
+
+        def has_children() -> bool:
+            children.extend(children_of(owner.pid))
+            return bool(children)
+
+        assert wait_until(has_children, 10.0)
         # a recorder comes after it
-        daemon = processes_of(owner.pid)[0]
+        daemon = children[0]
         try:
             time.sleep(1.0)
             assert alive(daemon) and owner.poll() is None
