@@ -115,11 +115,14 @@ fn written_parameters_equal_constants_bit_for_bit() {
 fn parameters_at_their_start_change_nothing() {
     let constant = arm([]).compile().unwrap();
     let all = Param::ALL.into_iter();
-    // of a body of several links, masses that vary are added up in another order; friction that may be is a row to solve
+    // of a body of several links, masses that vary are added up in another order, and so are inverse weights of two bodies;
+    // friction that may be is a row to solve
     let others = [
         Param::BodyMassScale,
         Param::BodyMass,
         Param::BodyInertia,
+        Param::BodyCom,
+        Param::BodyInvweight0,
         Param::JointFriction,
     ];
     let exact: Vec<Param> = all.filter(|p| !others.contains(p)).collect();

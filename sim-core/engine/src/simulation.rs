@@ -13,6 +13,7 @@ use crate::options::{backends, check_memory, memory_of};
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_model::Model;
 use sim_physics::arrays::{Dtype, Field, Layout};
+use sim_physics::constants::options::Integrator;
 use std::sync::Arc;
 
 /// Many worlds of one model.
@@ -64,7 +65,9 @@ impl Simulation {
             }
         }
         let senses = options.fields.contains(&Field::Sensordata);
-        if senses && options.outputs_at == OutputsAt::LastSubstep {
+        let integrator = model.constants().integrator;
+        let lags = options.outputs_at == OutputsAt::LastSubstep;
+        if senses && lags && integrator == Integrator::RungeKutta {
             return Err(BackendError::LastSubstepSensors);
         }
         let refused = model.refused_sensors();

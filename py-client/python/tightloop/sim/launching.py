@@ -131,7 +131,8 @@ def launch(
             ``"last_substep"`` is where forces were evaluated last, as MuJoCo's ``mj_step`` leaves its data: the state
             before the last substep, or the last of the four points of a Runge-Kutta substep. Positions, velocities,
             activations, commands and counters are those of the frame. Frames of other calls than steps evaluate all
-            fields at their state. It saves an evaluation per step, and needs the CPU. ``sensordata`` does not have it.
+            fields at their state. It saves an evaluation per step, and needs the CPU. With a Runge-Kutta integrator,
+            ``sensordata`` does not have it.
         realtime: Keep to real time: simulated seconds per second, so that ``1.0`` is real time, or a `RealTime` with
             more choices. A step then returns when its frame is due, and `Sim.timing` tells how well that went. If left
             out, a step returns as soon as it can.

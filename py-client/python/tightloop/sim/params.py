@@ -42,7 +42,10 @@ class Params:
     ``joint_effort_limit`` [N·m or N; 1e30 is none], ``joint_friction`` [N·m or N], each (worlds, dofs),
     ``shape_mu`` (worlds, shapes) [–], ``body_f`` (worlds, bodies, 6) [N, N·m]. ``body_mass`` (worlds, bodies) [kg] and
     ``body_inertia`` (worlds, bodies, 6) [kg·m²] count before ``body_mass_scale``; an inertia is about the centre of
-    mass in the link's axes: xx, yy, zz, xy, xz, yz. ``actuator_gain`` and ``actuator_bias`` (worlds, actuators, 3) of
+    mass in the link's axes: xx, yy, zz, xy, xz, yz. ``body_com`` (worlds, bodies, 3) [m] is that centre.
+    ``body_invweight0`` (worlds, bodies) [1/kg] and ``dof_invweight0`` (worlds, dofs) are MuJoCo's, which make contacts
+    and limits soft. ``shape_mu_torsional`` and ``shape_mu_rolling`` (worlds, shapes) [m] are of geoms of MuJoCo
+    models. ``actuator_gain`` and ``actuator_bias`` (worlds, actuators, 3) of
     MuJoCo models are constant, factor of the length and factor of the velocity.
 
     ``command_delay`` (worlds,) [substeps]: delay until ``joint_f`` and targets of a frame act, rounded up to whole

@@ -267,9 +267,9 @@ pub enum BackendError {
         "a GPU evaluates outputs at the state in the frame; use outputs_at = frame, or device = cpu"
     )]
     LastSubstepOnGpu,
-    /// Sensors at the last substep.
+    /// Sensors at the last of the four points of a Runge-Kutta substep, where MuJoCo has none.
     #[error(
-        "field `sensordata` is evaluated at the state in the frame; use outputs_at = frame, or leave the field out"
+        "field `sensordata` of a Runge-Kutta step is evaluated at the state in the frame; use outputs_at = frame, or leave the field out"
     )]
     LastSubstepSensors,
 }

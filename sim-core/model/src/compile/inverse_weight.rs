@@ -182,7 +182,13 @@ fn mass_matrix(constants: &Constants<f64>) -> (faer::Mat<f64>, Frames, Vec<Spati
                 motions.extend(rotation.0.map(|axis| Spatial([Vec3::zero(), axis])));
             }
         }
-        let inertia = Inertia::placed(body.mass, body.center, body.inertia, &rotation, origin);
+        let inertia = Inertia::placed(
+            body.mass,
+            Vec3(body.center),
+            body.inertia,
+            &rotation,
+            origin,
+        );
         frames.push((rotation, origin));
         let path = path(constants, frames.len() - 1);
         for &a in &path {

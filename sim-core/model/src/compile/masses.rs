@@ -8,7 +8,12 @@ use sim_physics::constants::{Constants, Part};
 
 /// Do they vary?
 pub(super) fn vary(scene: &Description) -> bool {
-    let params = [Param::BodyMassScale, Param::BodyMass, Param::BodyInertia];
+    let params = [
+        Param::BodyMassScale,
+        Param::BodyMass,
+        Param::BodyInertia,
+        Param::BodyCom,
+    ];
     params.iter().any(|param| scene.params.contains(param))
 }
 
@@ -23,6 +28,10 @@ pub(super) fn starts(scene: &Description) -> SceneStarts {
                 .push(inertial.map_or(0.0, |inertial| inertial.mass));
             let tensor = inertial.map_or([[0.0; 3]; 3], |inertial| inertial.inertia);
             starts.inertias.push(packed(tensor));
+            let massless = || massless(robot, link).pos;
+            starts
+                .centers
+                .push(inertial.map_or_else(massless, |inertial| inertial.pos));
         }
     }
     starts
@@ -37,6 +46,7 @@ pub(super) fn add_parts(
     carriers: &[Carrier],
 ) {
     let turns = scene.params.contains(&Param::BodyInertia);
+    let shifts = scene.params.contains(&Param::BodyCom);
     // a link without mass may be given one
     let is_given = turns || scene.params.contains(&Param::BodyMass);
     for (place, link) in robot.link_order().into_iter().enumerate() {
@@ -52,7 +62,8 @@ pub(super) fn add_parts(
             mass: inertial.mass,
             center: carrier.pose.transform(inertial.pos),
             inertia: packed(carrier.pose.rotate_tensor(inertial.inertia)),
-            link_axes: turns.then(|| axes.map(|axis| carrier.pose.rotate(axis))),
+            link_axes: (turns || shifts).then(|| axes.map(|axis| carrier.pose.rotate(axis))),
+            link_origin: shifts.then_some(carrier.pose.pos),
         });
     }
 }

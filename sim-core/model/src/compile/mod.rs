@@ -32,7 +32,7 @@ use contacts::add_contacts;
 use contacts::pieces::{PlacedShape, Rules, placed_shapes};
 use contacts::sensors::add_contact_sensors;
 use inverse_weight::Reference;
-use precompiled::{check_models, output_site_names, take_inverse_weights};
+use precompiled::{check_models, output_site_names, sensors_of_centers, take_inverse_weights};
 use sensors::finish_sensors;
 use sim_physics::constants::actuators::Actuators;
 use sim_physics::constants::contact::Contacts;
@@ -88,7 +88,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     }
     m.scans = scene.placed_scans(&builder.carriers, &m.contacts)?;
     add_contact_sensors(&mut m, scene, &placed);
-    add_params(&mut m, scene, &builder, &placed)?;
+    add_params(&mut m, scene, &builder, &placed, &reference)?;
     model(scene, m, builder, reference)
 }
 
@@ -185,8 +185,12 @@ fn add_params(
     scene: &Description,
     builder: &BodyBuilder,
     placed: &[PlacedShape<'_>],
+    reference: &Reference,
 ) -> Result<(), ModelError> {
     let starts = SceneStarts {
+        link_inverse_weights: reference.link_inverse_weight.clone(),
+        dof_inverse_weights: reference.dof_inverse_weight.clone(),
+        turning_mu: placed.iter().map(PlacedShape::turning_mu).collect(),
         mu: placed.iter().map(|shape| shape.surface.mu).collect(),
         contact_sensors: scene.sensed_shapes()?.len(),
         ..masses::starts(scene)
@@ -243,7 +247,7 @@ fn model(
         equality_names: builder.equality_names,
         actuator_names: builder.actuator_names,
         sensors: builder.sensor_infos,
-        refused_sensors: builder.refused_sensors,
+        refused_sensors: [builder.refused_sensors, sensors_of_centers(scene)].concat(),
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         output_site_names: output_site_names(scene),
         contact_sensors: scene.sensed_shapes()?,

@@ -1,11 +1,11 @@
 //! Robots that come compiled: whether they fit together, and the inverse weights that they bring.
 
 use super::inverse_weight::Reference;
-use crate::description::{Description, Robot};
+use crate::description::{Description, OnLink, Robot, Sense};
 use crate::error::ModelError;
 use crate::model::RobotRange;
+use crate::pose::Pose;
 use sim_physics::constants::params::Param;
-use std::collections::BTreeSet;
 
 /// Puts MuJoCo's inverse weights in the place of ours, for the robots that it compiled.
 pub(super) fn take_inverse_weights(
@@ -25,6 +25,40 @@ pub(super) fn take_inverse_weights(
             reference.mean_inertia = parts.mean_inertia;
         }
     }
+}
+
+/// Reasons against sensors in inertial frames of bodies, which do not follow a centre of mass that varies.
+pub(super) fn sensors_of_centers(scene: &Description) -> Vec<String> {
+    if !scene.params.contains(&Param::BodyCom) {
+        return Vec::new();
+    }
+    let mut reasons = Vec::new();
+    for robot in &scene.robots {
+        let Some(parts) = &robot.precompiled else {
+            continue;
+        };
+        let is_inertial = |on: &OnLink| {
+            let inertia = parts.frames.inertias.get(on.link);
+            on.pose != Pose::identity() && inertia.is_some_and(|inertia| inertia.pose == on.pose)
+        };
+        for sensor in &parts.sensors.all {
+            let moves = match &sensor.sense {
+                Some(Sense::Frame { of, from, .. }) => {
+                    is_inertial(of) || from.as_ref().is_some_and(is_inertial)
+                }
+                Some(Sense::Acceleration { of, .. }) => is_inertial(of),
+                _ => false,
+            };
+            if moves {
+                reasons.push(format!(
+                    "model `{}`: sensor `{}`: no support for a body's centre of mass where body_com varies; \
+                     use objtype xbody or a site",
+                    robot.name, sensor.name
+                ));
+            }
+        }
+    }
+    reasons
 }
 
 /// Names of the sites of MuJoCo models, in the order of their frames.
@@ -64,25 +98,11 @@ pub(super) fn check_models(scene: &Description) -> Result<(), ModelError> {
             ),
         });
     }
-    let has_pairs = |robot: &&Robot| {
-        let parts = robot.precompiled.as_ref();
-        parts.is_some_and(|parts| !parts.pairs.is_empty())
-    };
-    if let Some(robot) = models.iter().copied().find(has_pairs)
-        && scene.params.contains(&Param::ShapeMu)
-    {
-        return Err(ModelError::MujocoRefused {
-            reasons: format!(
-                "shape_mu cannot vary: pairs of model `{}` have friction of their own; remove the pairs",
-                robot.name
-            ),
-        });
-    }
     let drags = |robot: &&Robot| {
         let parts = robot.precompiled.as_ref();
         parts.is_some_and(|parts| !parts.drags.is_empty())
     };
-    let massive = [Param::BodyMass, Param::BodyInertia];
+    let massive = [Param::BodyMass, Param::BodyInertia, Param::BodyCom];
     if let Some(robot) = models.iter().copied().find(drags)
         && let Some(param) = massive.iter().find(|param| scene.params.contains(param))
     {
@@ -93,18 +113,6 @@ pub(super) fn check_models(scene: &Description) -> Result<(), ModelError> {
                 param.row().name,
                 robot.name
             ),
-        });
-    }
-    let geoms = models.iter().flat_map(|robot| &robot.links);
-    let geoms = geoms.flat_map(|link| &link.collisions);
-    let priorities: BTreeSet<i64> = geoms
-        .filter_map(|collision| Some(collision.geom.as_ref()?.priority))
-        .collect();
-    if priorities.len() > 1 && scene.params.contains(&Param::ShapeMu) {
-        return Err(ModelError::MujocoRefused {
-            reasons: "shape_mu cannot vary: geoms have different priorities, which decide whose friction counts; \
-                      make them equal"
-                .to_owned(),
         });
     }
     Ok(())

@@ -35,7 +35,8 @@ view! {
         };
     Part<f64> as "Part":
         Always { "link": link, "mass": mass, "center": center, "inertia": inertia }
-        Later { "link_axes": link_axes };
+        Later { "link_axes": link_axes }
+        Later { "link_origin": link_origin };
     Dof<f64> as "Dof":
         Always {
             "body": body,

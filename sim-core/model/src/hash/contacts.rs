@@ -32,7 +32,7 @@ view! {
         Later { "turning": turning }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
-        => are_stiff, impedances, bodies;
+        => are_stiff, impedances, bodies, has_rules, varying;
     Handles as "Handles":
         Always {
             "pair_numbers": pair_numbers,
@@ -90,7 +90,8 @@ view! {
             "axes": axes,
             "is_upright": is_upright,
             "center": center,
-        };
+        }
+        => link, friction;
     Group as "Group":
         Always { "kinds": kinds, "first": first, "end": end };
     Pair as "Pair":

@@ -104,8 +104,12 @@ recast! {
         pub turning: Fixed,
         /// How the friction of two shapes combines.
         pub combine: FrictionCombine,
-        /// Of each pair, 1 where the larger friction counts all the same; without rows where that is so of none or of all.
+        /// Of each pair, which friction counts ([`rule`]); without rows where all combine, or all have the larger one.
         pub keeps_max: Fixed,
+        /// Whether friction of some pairs follows a rule beyond [`rule::LARGER`].
+        pub has_rules: bool,
+        /// What of contacts differs from world to world.
+        pub varying: VaryingSurfaces,
         /// Whether capsules and boxes have the points of `collide::primitive::capsule_box`.
         pub two_point_capsule_boxes: bool,
         /// Impedances of pairs.
@@ -113,6 +117,60 @@ recast! {
         /// Bodies that contacts act on, among those of outputs.
         pub bodies: TouchedBodies,
     }
+}
+
+/// Scalars of surfaces and bodies that differ from world to world, where some contact needs them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VaryingSurfaces {
+    /// Sliding friction.
+    pub mu: bool,
+    /// Torsional and rolling friction.
+    pub turning: bool,
+    /// Inverse weights of bodies.
+    pub weight: bool,
+}
+
+impl VaryingSurfaces {
+    /// Does any of them vary?
+    pub fn any(self) -> bool {
+        self.mu || self.turning || self.weight
+    }
+
+    /// Columns of the table of surfaces: sliding friction is the first.
+    pub fn columns(self) -> usize {
+        match self.turning || self.weight {
+            true => surface::COLUMNS,
+            false => 1,
+        }
+    }
+}
+
+/// Columns of the table of surfaces, which has a row per solid.
+pub mod surface {
+    /// Coefficient of sliding friction [–].
+    pub const MU: usize = 0;
+    /// Coefficient of torsional friction [m].
+    pub const TORSION: usize = 1;
+    /// Coefficient of rolling friction [m].
+    pub const ROLLING: usize = 2;
+    /// Inverse weight of the body [1/kg].
+    pub const WEIGHT: usize = 3;
+    /// Their number.
+    pub const COLUMNS: usize = 4;
+}
+
+/// Which friction of two shapes counts for a pair, where it varies.
+pub mod rule {
+    /// What [`FrictionCombine`](super::FrictionCombine) makes of both.
+    pub const COMBINED: f64 = 0.0;
+    /// The larger one.
+    pub const LARGER: f64 = 1.0;
+    /// That of the first shape, which has a higher priority.
+    pub const FIRST: f64 = 2.0;
+    /// That of the second shape.
+    pub const SECOND: f64 = 3.0;
+    /// The pair's own, which does not vary.
+    pub const OWN: f64 = 4.0;
 }
 
 recast! {
@@ -207,7 +265,7 @@ pub struct Memory {
     pub field_cells: Table,
     /// Prisms of a height field that a shape may touch.
     pub field_prisms: Table,
-    /// Coefficient of friction of each solid, where it varies [–].
+    /// What varies of each solid; see [`surface`].
     pub mu: Table,
     /// Scalars of all tables.
     pub len: usize,
@@ -221,6 +279,10 @@ recast! {
         pub kind: Kind,
         /// Its shape, as in `shape_names`.
         pub shape: usize,
+        /// Its link, as in `body_names`; none of a static shape.
+        pub link: Option<usize>,
+        /// Coefficients of sliding [–], torsional and rolling friction [m].
+        pub friction: [R; 3],
         /// The body that carries it, or none.
         pub body: Option<usize>,
         /// Its axes in the body's frame, or in the world: columns [–].
@@ -399,6 +461,8 @@ pub mod row {
     pub const MU: usize = 9;
     /// Reference acceleration: normal, two tangents [m/s²].
     pub const AREF: usize = 10;
+    /// Until the reference acceleration is known: torsional and rolling friction [m], and inverse weight [1/kg], where they vary.
+    pub const VARYING: usize = AREF;
     /// J a - aref (3) [m/s²].
     pub const JAR: usize = 13;
     /// The same somewhere else, or its change (3) [m/s²].
@@ -439,6 +503,9 @@ pub mod turning {
 
 /// Directions in which a contact pushes or rubs, at most.
 pub const DIRECTIONS_MAX: usize = 6;
+
+/// Least inverse weight of two bodies (MuJoCo: `mjMINVAL`) [1/kg].
+pub const WEIGHT_MIN: f64 = 1e-15;
 
 /// Least coefficient of friction of a contact that has any (MuJoCo: `mjMINMU`) [–].
 pub const MU_MIN: f64 = 1e-5;
@@ -507,6 +574,8 @@ impl<R: Real> Contacts<R> {
             turning: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
+            has_rules: false,
+            varying: VaryingSurfaces::default(),
             two_point_capsule_boxes: false,
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),
@@ -520,4 +589,4 @@ impl<R: Real> Contacts<R> {
     }
 }
 
-same! { Fixed, UpdatePath, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory, TouchedBodies }
+same! { VaryingSurfaces, Fixed, UpdatePath, Cone, FrictionCombine, Kind, Group, Pair, Column, Run, Handles, HullTables, FieldTables, Memory, TouchedBodies }

@@ -219,8 +219,10 @@ recast! {
         pub center: [R; 3],
         /// xx yy zz xy xz yz about its centre of mass, in the body's axes [kg·m²].
         pub inertia: [R; 6],
-        /// Columns of the rotation from the link's axes to the body's, where its inertia varies [–].
+        /// Columns of the rotation from the link's axes to the body's, where its inertia or centre of mass varies [–].
         pub link_axes: Option<[[R; 3]; 3]>,
+        /// Origin of the link in the body's frame, where its centre of mass varies [m].
+        pub link_origin: Option<[R; 3]>,
     }
 }
 

@@ -96,6 +96,11 @@ params! {
     BodyInertia "body_inertia" Per::Body(6), "kg·m²" None, "Inertia of each link about its centre of mass in the link's axes, before its scale: xx, yy, zz, xy, xz, yz.";
     ActuatorGain "actuator_gain" Per::Actuator(3), "–" None, "Gain of each actuator of MuJoCo models: constant, per length, per velocity.";
     ActuatorBias "actuator_bias" Per::Actuator(3), "–" None, "Bias of each actuator of MuJoCo models: constant, per length, per velocity.";
+    BodyCom "body_com" Per::Body(3), "m" None, "Centre of mass of each link in its own axes. The point that the velocity of a free joint is of stays where the scene has it.";
+    BodyInvweight0 "body_invweight0" Per::Body(1), "1/kg" Some(0.0), "Inverse weight of each link at the reference pose, MuJoCo's first `body_invweight0`: the softness of its contacts.";
+    DofInvweight0 "dof_invweight0" Per::Dof, "1/(kg·m²) or 1/kg" Some(0.0), "Inverse inertia of each dof at the reference pose, as MuJoCo's: the softness of the limits of hinges and slides.";
+    ShapeMuTorsional "shape_mu_torsional" Per::Shape, "m" Some(0.0), "Coefficient of torsional friction of each geom of MuJoCo models. It counts where contacts have condim 4 or 6.";
+    ShapeMuRolling "shape_mu_rolling" Per::Shape, "m" Some(0.0), "Coefficient of rolling friction of each geom of MuJoCo models. It counts where contacts have condim 6.";
 }
 
 /// Least mass and inertia of a link over those of the scene [–].
@@ -154,6 +159,11 @@ impl Param {
             Param::BodyF => vec![0.0; 6 * m.frames.len()],
             Param::BodyMass => scene.masses.clone(),
             Param::BodyInertia => scene.inertias.as_flattened().to_vec(),
+            Param::BodyCom => scene.centers.as_flattened().to_vec(),
+            Param::BodyInvweight0 => scene.link_inverse_weights.clone(),
+            Param::DofInvweight0 => scene.dof_inverse_weights.clone(),
+            Param::ShapeMuTorsional => scene.turning_mu.iter().map(|mu| mu[0]).collect(),
+            Param::ShapeMuRolling => scene.turning_mu.iter().map(|mu| mu[1]).collect(),
             Param::ActuatorGain => m
                 .actuators
                 .all
@@ -186,6 +196,14 @@ pub struct SceneStarts {
     pub masses: Vec<f64>,
     /// Inertia of each link in its axes: xx, yy, zz, xy, xz, yz [kg·m²].
     pub inertias: Vec<[f64; 6]>,
+    /// Centre of mass of each link in its axes [m].
+    pub centers: Vec<[f64; 3]>,
+    /// Inverse weight of each link at the reference pose [1/kg].
+    pub link_inverse_weights: Vec<f64>,
+    /// Inverse inertia of each dof at the reference pose [1/(kg·m²) or 1/kg].
+    pub dof_inverse_weights: Vec<f64>,
+    /// Torsional and rolling friction of each shape [m].
+    pub turning_mu: Vec<[f64; 2]>,
 }
 
 /// The noise of each command, in the order `joint_f`, `joint_target_q`, `joint_target_qd`.

@@ -71,12 +71,12 @@ impl<F: Num> Inertia<F> {
     #[inline(always)]
     pub fn placed(
         m: F,
-        center: [F::Real; 3],
+        center: Vec3<F>,
         inertia: [F; 6],
         rotation: &Mat3<F>,
         origin: Vec3<F>,
     ) -> Self {
-        let c = rotation.mul_add(Vec3::constant(center), origin);
+        let c = rotation.mul_add(center, origin);
         let h = c * m;
         let [xx, yy, zz, xy, xz, yz] = inertia;
         // columns of R I

@@ -56,30 +56,36 @@ def assert_sensors(case: Live, seed: int, tolerance: float) -> set[str]:
     """
     states = case.states(seed)
     frame = case.place(states)
-    model, shown = case.model, set()
+    shown: set[str] = set()
     for world, data in enumerate(case.data(states)):
         data.time = frame.time[world]
-        mujoco.mj_forward(model, data)
-        if not all(has_closed_form(model, contact) for contact in data.contact):
-            continue
-        if strains(model, data):
-            continue
-        # what a body feels is a sum of these
-        forces = np.abs(data.cfrc_ext).max()
-        kinds = np.repeat(model.sensor_type, model.sensor_dim)
-        assert frame.sensordata[world].shape == data.sensordata.shape
-        for sensor in range(model.nsensor):
-            own = slice(model.sensor_adr[sensor], model.sensor_adr[sensor] + model.sensor_dim[sensor])
-            both = (data.sensordata[own], frame.sensordata[world, own])
-            expected, found = (comparable(model, sensor, values) for values in both)
-            alike = data.sensordata[kinds == model.sensor_type[sensor]]
-            felt = forces if model.sensor_needstage[sensor] == mujoco.mjtStage.mjSTAGE_ACC else 0.0
-            scale = max(1.0, felt, np.abs(alike).max())
-            error = np.abs(found - expected).max() / scale
-            name = kind_of(model, sensor)
-            assert error < tolerance, f"world {world}, {name} {sensor}: {found}, not {expected}"
-            if expected.any():
-                shown.add(name)
+        mujoco.mj_forward(case.model, data)
+        shown |= assert_same_sensors(case.model, data, world, frame.sensordata[world], tolerance)
+    return shown
+
+
+def assert_same_sensors(
+    model: mujoco.MjModel, data: mujoco.MjData, world: int, values: np.ndarray, tolerance: float
+) -> set[str]:
+    """Compare all sensors of a world; return the types that were not 0, none where MuJoCo has no unique answer."""
+    shown: set[str] = set()
+    if strains(model, data) or not all(has_closed_form(model, contact) for contact in data.contact):
+        return shown
+    # what a body feels is a sum of these
+    forces = np.abs(data.cfrc_ext).max()
+    kinds = np.repeat(model.sensor_type, model.sensor_dim)
+    assert values.shape == data.sensordata.shape
+    for sensor in range(model.nsensor):
+        own = slice(model.sensor_adr[sensor], model.sensor_adr[sensor] + model.sensor_dim[sensor])
+        expected, found = (comparable(model, sensor, all_[own]) for all_ in (data.sensordata, values))
+        alike = data.sensordata[kinds == model.sensor_type[sensor]]
+        felt = forces if model.sensor_needstage[sensor] == mujoco.mjtStage.mjSTAGE_ACC else 0.0
+        scale = max(1.0, felt, np.abs(alike).max())
+        error = np.abs(found - expected).max() / scale
+        name = kind_of(model, sensor)
+        assert error < tolerance, f"world {world}, {name} {sensor}: {found}, not {expected}"
+        if expected.any():
+            shown.add(name)
     return shown
 
 
@@ -119,6 +125,22 @@ def test_contacts_that_sensors_show_are_mujocos(seed: int, cone: str) -> None:
     text = add_sensors(heap(seed, f'cone="{cone}"'), seed, 20, ("contact", "touch", "force", "torque"))
     with live(mujoco.MjModel.from_xml_string(text), fields=("sensordata",)) as case:
         assert_sensors(case, seed, 1e-6)
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("seed", range(TREES // 4))
+def test_sensors_of_the_last_substep_lag_as_mujocos(seed: int, integrator: str, substeps: int) -> None:
+    features = replace(TOUCHING, option=f'integrator="{integrator}"')
+    shown: set[str] = set()
+    with live(model_of(seed, features), fields=("sensordata",), substeps=substeps, outputs_at="last_substep") as case:
+        states = case.states(seed)
+        case.place(states)
+        frame = case.sim.step(**({"ctrl": states.ctrl} if case.model.nu else {}))
+        for world, data in enumerate(case.data(states)):
+            mujoco.mj_step(case.model, data, substeps)
+            shown |= assert_same_sensors(case.model, data, world, frame.sensordata[world], 1e-6)
+    assert shown
 
 
 @pytest.mark.parametrize("seed", range(TREES // 2))

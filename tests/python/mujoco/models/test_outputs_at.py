@@ -76,5 +76,6 @@ def test_what_cannot_lag_is_refused() -> None:
         tl.launch(scene, worlds=1, outputs_at="first_substep")
     with pytest.raises(ArgumentError, match="a GPU evaluates outputs at the state in the frame"):
         tl.launch(scene, worlds=1, device="gpu", outputs_at="last_substep")
-    with pytest.raises(ArgumentError, match="`sensordata` is evaluated at the state in the frame"):
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml(1, "RK4")))
+    with pytest.raises(ArgumentError, match="`sensordata` of a Runge-Kutta step"):
         tl.launch(scene, worlds=1, fields=("sensordata",), outputs_at="last_substep")

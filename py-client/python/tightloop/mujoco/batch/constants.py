@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions
 from tightloop.mujoco.batch.library import mujoco
 
-#: Constants that make constraints soft; simulations keep those of the model.
+#: Constants that make constraints soft.
 _SOFTNESS = ("body_invweight0", "dof_invweight0", "tendon_invweight0")
+#: Kinds of joints whose limits follow ``dof_invweight0``.
+_AXES = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
 def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_sims: int) -> None:
@@ -55,23 +57,18 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
         for name, value in values.items():
             if name in expansions.names:
                 expansions.of(name)[sim] = value
-    if any(name in expansions.names for name in _SOFTNESS) and _has_constraints(model):
+    if any(name in expansions.names for name in _SOFTNESS) and _keeps_softness(model):
         warnings.warn(
-            "set_const: limits, contacts, equalities and dry friction keep the softness of the model, "
-            "since tightloop does not vary body_invweight0, dof_invweight0 and tendon_invweight0",
+            "set_const: equalities, dry friction, tendons and limits of balls keep the softness of the model; "
+            "contacts and limits of other joints follow body_invweight0 and dof_invweight0",
             stacklevel=4,
         )
     if failed:
         raise RuntimeError(failed)
 
 
-def _has_constraints(model: Any) -> bool:
-    touching = np.asarray(model.geom_contype) | np.asarray(model.geom_conaffinity)
-    bounded = [
-        model.jnt_limited,
-        model.tendon_limited,
-        model.dof_frictionloss,
-        model.tendon_frictionloss,
-        model.eq_type,
-    ]
-    return bool(touching.any()) or any(len(array) and np.any(array) for array in bounded) or model.neq > 0
+def _keeps_softness(model: Any) -> bool:
+    """Whether a model has constraints whose softness does not vary."""
+    balls = np.asarray(model.jnt_limited).astype(bool) & ~np.isin(model.jnt_type, _AXES)
+    bounded = [balls, model.tendon_limited, model.dof_frictionloss, model.tendon_frictionloss]
+    return any(len(array) and bool(np.any(array)) for array in bounded) or model.neq > 0

@@ -26,8 +26,14 @@ _SWITCHES = {
     "dof_damping": ("mjDSBL_DAMPER",),
     "dof_frictionloss": ("mjDSBL_FRICTIONLOSS", "mjDSBL_CONSTRAINT"),
 }
+#: Constants that `mj_setConst` computes and that act: what makes contacts and limits soft.
+_SOFTNESS = ("body_invweight0", "dof_invweight0")
+#: Columns of ``geom_friction`` as parameters: of sliding, torsion and rolling.
+_FRICTIONS = ("shape_mu", "shape_mu_torsional", "shape_mu_rolling")
+#: Largest condim of contacts that have sliding friction alone.
+_SLIDING = 3
 #: Model fields that act.
-_VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, "geom_friction")
+_VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, "geom_friction", *_SOFTNESS)
 #: What ``mj_setConst`` computes. A batch computes it for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
@@ -38,6 +44,11 @@ _VISUAL = ("cam_", "light_", "mat_", "skin_", "geom_rgba", "geom_matid", "geom_g
 #: Beginnings of the names of assets, which are not expanded.
 _ASSETS = ("mesh_", "hfield_", "tex_", "skin_", "bvh_", "text_", "name_", "numeric_", "tuple_", "key_", "plugin_")
 _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+
+
+def is_visual(name: str) -> bool:
+    """Whether a field of this name has no influence on the motion."""
+    return name.startswith(_VISUAL)
 
 
 class Expansions:
@@ -107,12 +118,18 @@ class Expansions:
     def params(self) -> tuple[str, ...]:
         """Return the parameters that must vary for what is expanded."""
         found = [_SAME[name] for name in self._arrays if name in _SAME]
-        if any(name in self._arrays for name in masses.FIELDS):
-            found.extend(masses.FIELDS)
+        found.extend(masses.params(self.names))
         found.extend(param for name, param in gains.PARAMS.items() if name in self._arrays)
         if "geom_friction" in self._arrays:
-            found.append("shape_mu")
+            found.extend(self._frictions)
+        found.extend(name for name in _SOFTNESS if name in self._arrays)
         return tuple(found)
+
+    @property
+    def _frictions(self) -> tuple[str, ...]:
+        """Parameters that ``geom_friction`` becomes."""
+        turns = (np.asarray(self._model.geom_condim) > _SLIDING).any()
+        return _FRICTIONS if turns else _FRICTIONS[:1]
 
     def values(self, shapes: list[int], ids: Array) -> dict[str, Array]:
         """Return the parameters of all simulations, ``(num_sims, columns)``, after a check of the given ones.
@@ -133,16 +150,24 @@ class Expansions:
             elif name in gains.PARAMS:
                 self._check_finite(name, ids)
                 found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
-            elif name in masses.FIELDS:
+            elif name in masses.FIELDS or name in _SOFTNESS or name == "geom_friction":
                 self._check_finite(name, ids)
-        if any(name in self._arrays for name in masses.FIELDS):
-            bodies = self._model.nbody
+        bodies = self._model.nbody
+        wanted = masses.params(self.names)
+        if "body_mass" in wanted:
             found["body_mass"] = np.broadcast_to(self.of("body_mass"), (self._sims, bodies)).astype(np.float64)
             tensors = self._inertias.of(self.of("body_inertia"))
             found["body_inertia"] = np.broadcast_to(tensors, (self._sims, bodies, 6))
+        if "body_com" in wanted:
+            found["body_com"] = self._arrays["body_ipos"].astype(np.float64)
         if "geom_friction" in self._arrays:
-            self._check_friction(ids)
-            found["shape_mu"] = self._arrays["geom_friction"][:, shapes, 0].astype(np.float64)
+            columns = self._arrays["geom_friction"][:, shapes].astype(np.float64)
+            found |= {name: columns[..., column] for column, name in enumerate(self._frictions)}
+        if "body_invweight0" in self._arrays:
+            # the first of both is of translation, which contacts have
+            found["body_invweight0"] = self._arrays["body_invweight0"][..., 0].astype(np.float64)
+        if "dof_invweight0" in self._arrays:
+            found["dof_invweight0"] = self._arrays["dof_invweight0"].astype(np.float64)
         return found
 
     def _switch(self, name: str) -> float:
@@ -188,7 +213,7 @@ class Expansions:
         """
         self.check_sleep(ids)
         for name, array in self._arrays.items():
-            free = name in _VARYING or name in CONSTANTS or name.startswith(_VISUAL)
+            free = name in _VARYING or name in CONSTANTS or is_visual(name)
             if free and name not in also:
                 continue
             template = np.asarray(self._template(name)).astype(array.dtype)
@@ -201,17 +226,3 @@ class Expansions:
                     f"sim {sim}: {name} differs from the model's; tightloop varies {', '.join(_VARYING)}, "
                     "so make a Batch per value"
                 )
-
-    def _check_friction(self, ids: Array) -> None:
-        """Torsional and rolling friction follow the sliding one."""
-        own = np.asarray(self._model.geom_friction)
-        rich = np.flatnonzero(np.asarray(self._model.geom_condim) > 3)
-        given = self._arrays["geom_friction"][ids][:, rich].astype(np.float64)
-        # products instead of quotients, since a coefficient may be 0
-        wrong = ~np.isclose(given[..., 1:] * own[rich, :1], own[rich, 1:] * given[..., :1], rtol=1e-6, atol=1e-12)
-        if wrong.any():
-            sim, geom = np.argwhere(wrong.any(axis=-1))[0]
-            raise ArgumentError(
-                f"sim {ids[sim]}: geom_friction of geom {rich[geom]}: tightloop scales torsional and rolling friction "
-                "with the sliding one; change all three by one factor"
-            )

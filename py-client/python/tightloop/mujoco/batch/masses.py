@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,16 @@ from tightloop.planning.rotations import rotations
 
 Array = NDArray[Any]
 
-#: Model fields, and parameters of a simulation of the same names: inertias in the axes of bodies there.
-FIELDS = ("body_mass", "body_inertia")
+#: Model fields of masses.
+FIELDS = ("body_mass", "body_inertia", "body_ipos")
 # entries of a symmetric matrix in the order of `body_inertia`: xx, yy, zz, xy, xz, yz
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
+
+
+def params(expanded: Collection[str]) -> tuple[str, ...]:
+    """Return the parameters that expanded fields become: mass and inertia together, inertia in the axes of the body."""
+    heavy = ("body_mass", "body_inertia") if {"body_mass", "body_inertia"}.intersection(expanded) else ()
+    return (*heavy, "body_com") if "body_ipos" in expanded else heavy
 
 
 class Inertias:

@@ -157,9 +157,9 @@ class Batch(NamedViews):
         """Return values of a field of ``MjModel`` or ``MjOption`` for each simulation, ``(num_sims, ...)``.
 
         ``gravity``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``, ``geom_friction``, ``body_mass``,
-        ``body_inertia``, ``actuator_gainprm`` and ``actuator_biasprm`` act from the next call on. Other fields may be
-        read, and a step refuses values that differ from the model's. Fields for pictures, and what `set_const`
-        computes, have no effect on the motion.
+        ``body_inertia``, ``body_ipos``, ``actuator_gainprm``, ``actuator_biasprm``, ``body_invweight0`` and
+        ``dof_invweight0`` act from the next call on. Other fields may be read, and a step refuses values that differ
+        from the model's. Fields for pictures, and what else `set_const` computes, have no effect on the motion.
 
         Args:
             name: The field.
@@ -239,9 +239,8 @@ class Batch(NamedViews):
     def set_const(self, ids: ArrayLike | None = None) -> None:
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
 
-        The simulations themselves need none: motion and ``subtree_com`` follow expanded fields at once. Limits,
-        contacts and equalities keep the softness of the model, which a warning reports. MuJoCo runs once
-        per simulation.
+        Contacts and limits of hinges and slides then have the softness of each simulation. Equalities, dry friction,
+        tendons and limits of balls keep that of the model, which a warning reports. MuJoCo runs once per simulation.
 
         Args:
             ids: As in `step`.
@@ -254,6 +253,7 @@ class Batch(NamedViews):
             chosen = Selection(ids, self.num_sims)
             self._expansions.check_sleep(chosen.indices)
             set_const(self._own, self._expansions, chosen.indices, self.num_sims)
+            self._engine.require(params=self._expansions.params())
 
     def rays(  # noqa: PLR0917, mjbatch has these arguments in this order
         self,

@@ -53,6 +53,8 @@ pub(super) struct Job<F: Lane> {
     pub finds_contacts: bool,
     /// Duration of a control frame [s].
     pub frame_s: f64,
+    /// Duration of a substep [s].
+    pub dt: f64,
     /// Bounds of faults.
     pub faults: Faults,
     /// State and commands of a world after a reset, in the order of [`RECORD`].
@@ -109,6 +111,7 @@ impl<F: Lane> Job<F> {
             stages,
             layout,
             frame_s: model.substeps() as f64 * model.dt(),
+            dt: model.dt(),
             faults: Faults::default(),
             start: state::start(model),
             draw: StartDraw::new(model),

@@ -258,7 +258,7 @@ impl<F: Lane> Chunk<F> {
         probe.after_part(Part::Grouping);
         let lags = substeps > 0 && job.evaluate_last.is_some();
         // SAFETY: the arena holds the layout.
-        unsafe { self.put_fields(job, block, arena, |field| !(lags && field.lags())) };
+        unsafe { self.put_fields(job, block, arena, 0.0, |field| !(lags && field.lags())) };
         probe.after_part(Part::Fields);
     }
 
@@ -315,13 +315,14 @@ impl<F: Lane> Chunk<F> {
             for &stage in stages {
                 self.run_stage(job, block, stage, true, probe);
             }
-            self.put_fields(job, block, arena, Field::lags);
+            // the frame is not counted yet, and its last substep has not passed
+            self.put_fields(job, block, arena, job.frame_s - job.dt, Field::lags);
         }
         probe.after_part(Part::Fields);
         self.block.joint_qdd.copy_from_slice(&self.kept);
     }
 
-    /// Writes those fields of a block that are no counters.
+    /// Writes those fields of a block that are no counters; `passed_s` is the time since the last frame that was counted.
     ///
     /// # Safety
     /// The arena holds the job's layout.
@@ -331,6 +332,7 @@ impl<F: Lane> Chunk<F> {
         job: &Job<F>,
         block: usize,
         arena: Arena,
+        passed_s: f64,
         is_due: impl Fn(Field) -> bool,
     ) {
         let slots = job.layout.slots.iter();
@@ -346,7 +348,7 @@ impl<F: Lane> Chunk<F> {
                     for lane in self.lanes_of(block) {
                         let world = self.assignment.world(lane);
                         let row = arena.row(slot, self.worlds.start + world);
-                        let time = self.steps[world] as f64 * job.frame_s;
+                        let time = self.steps[world] as f64 * job.frame_s + passed_s;
                         clocks::put(&job.constants, time, row);
                     }
                 }

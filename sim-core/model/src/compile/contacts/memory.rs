@@ -7,7 +7,6 @@ use sim_physics::constants::contact::{
     COUNTS, Contacts, Handles, Kind, Memory, pair, row, turning,
 };
 use sim_physics::constants::height_field::FIELD_CANDIDATES;
-use sim_physics::constants::params::Param;
 use sim_physics::lane::{Fixed, Table};
 
 /// Contacts that there is room for by default, where more could be found: a hundred shapes in a heap.
@@ -85,8 +84,8 @@ impl ContactBuilder<'_> {
             origins: table(3, self.constants.trees.len() + 1),
             counts: table(1, contacts.classes.len() + COUNTS),
             rows: table(row_len, rows),
-            mu: match self.scene.params.contains(&Param::ShapeMu) {
-                true => table(1, self.pieces.len()),
+            mu: match contacts.varying.any() {
+                true => table(contacts.varying.columns(), self.pieces.len()),
                 false => contacts.memory.mu,
             },
             cut: match contacts.hulls.spans.rows + clipped {

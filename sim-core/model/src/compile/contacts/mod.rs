@@ -12,10 +12,11 @@ use crate::error::ModelError;
 use clusters::clusters;
 use fields::add_fields;
 use pairs::ContactBuilder;
-use pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
+use pieces::{PlacedShape, Rules, contacts_of, named_pair, pairs, pieces};
 use sensors::add_touched_bodies;
 use sim_physics::constants::contact::{
-    Class, Column, Cone, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run, pair, row,
+    Class, Column, Cone, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run,
+    VaryingSurfaces, pair, row, rule,
 };
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::constants::params::Param;
@@ -23,6 +24,7 @@ use sim_physics::constants::{Constants, Coupled, Impedance};
 use sim_physics::lane::Fixed;
 use sim_physics::math::factor::{Pattern, UpdatePath};
 use sim_physics::step::constraints::contact_rows::{EDGES_MAX, edge_stiffness};
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Stiffness of a contact over the mass of what it moves, above which single precision may lose that mass in their sum [–]. Levers
@@ -46,6 +48,12 @@ pub(super) fn add_contacts(
         constants.contacts = contacts;
         return Ok(());
     }
+    let varies = |param| scene.params.contains(&param);
+    contacts.varying = VaryingSurfaces {
+        mu: varies(Param::ShapeMu),
+        turning: varies(Param::ShapeMuTorsional) || varies(Param::ShapeMuRolling),
+        weight: varies(Param::BodyInvweight0),
+    };
     let builder = ContactBuilder {
         constants,
         scene,
@@ -132,6 +140,7 @@ impl ContactBuilder<'_> {
             first += capacity;
         }
         let is_wide = self.add_turning(contacts, pairs);
+        contacts.varying.turning &= is_wide;
         // a backend that knows only the largest size of each class must provide this many rows
         let [first_end, capacity_end] = contacts.row_ends();
         let rows = first_end + capacity_end - 2;
@@ -244,25 +253,43 @@ impl ContactBuilder<'_> {
         contacts.classes.iter().any(|class| class.turns.is_some())
     }
 
-    /// Notes how friction combines, and which pairs keep MuJoCo's rule: those that are of MuJoCo's geoms.
+    /// Notes how friction combines, and of each pair whose friction counts where it varies.
     fn add_combine(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) {
         contacts.combine = self.scene.friction_combine;
-        let keeps: Vec<f64> = pairs
-            .iter()
-            .map(|&(a, b)| {
-                let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
-                f64::from(u8::from(self.geom_pair(a, b).is_some()))
-            })
-            .collect();
-        if contacts.combine == FrictionCombine::Max || !keeps.contains(&1.0) {
-            return;
+        let mut rules: Vec<f64> = pairs.iter().map(|&pair| self.friction_rule(pair)).collect();
+        let varies = contacts.varying.mu || contacts.varying.turning;
+        contacts.has_rules = varies && rules.iter().any(|&rule| rule > rule::LARGER);
+        if !contacts.has_rules {
+            rules
+                .iter_mut()
+                .for_each(|rule| *rule = rule.min(rule::LARGER));
+            if contacts.combine == FrictionCombine::Max || !rules.contains(&rule::LARGER) {
+                return;
+            }
         }
         contacts.keeps_max = Fixed {
             base: contacts.tables.numbers.len(),
             stride: 1,
             rows: pairs.len(),
         };
-        contacts.tables.numbers.extend(keeps);
+        contacts.tables.numbers.extend(rules);
+    }
+
+    /// Whose friction counts for a pair: MuJoCo's rule for its geoms, that of the scene for others.
+    fn friction_rule(&self, (a, b): (usize, usize)) -> f64 {
+        let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        if self.geom_pair(a, b).is_none() {
+            return rule::COMBINED;
+        }
+        if named_pair(a, b, self.rules).is_some() {
+            return rule::OWN;
+        }
+        let [first, second] = [a, b].map(PlacedShape::priority);
+        match first.cmp(&second) {
+            Ordering::Equal => rule::LARGER,
+            Ordering::Greater => rule::FIRST,
+            Ordering::Less => rule::SECOND,
+        }
     }
 
     /// Whether a pair is of a capsule and a box, one of which is a geom of MuJoCo's.

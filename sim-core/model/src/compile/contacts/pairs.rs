@@ -7,11 +7,8 @@ use crate::description::Description;
 use crate::geom_contact::GeomContact;
 use crate::softness::Softness;
 use crate::surface::Surface;
-use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, pair};
+use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, WEIGHT_MIN, pair};
 use sim_physics::constants::{Constants, Impedance};
-
-/// Least inverse weight of a contact (MuJoCo: `mjMINVAL`) [1/kg].
-const WEIGHT_MIN: f64 = 1e-15;
 
 /// What the tables of contacts are built from.
 pub(super) struct ContactBuilder<'a> {

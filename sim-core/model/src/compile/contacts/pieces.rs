@@ -44,6 +44,19 @@ pub(in crate::compile) struct PlacedShape<'a> {
     pub pose: Pose,
 }
 
+impl PlacedShape<'_> {
+    /// MuJoCo's priority: of two geoms, the parameters of the higher one count.
+    pub fn priority(&self) -> i64 {
+        self.geom.map_or(0, |geom| geom.priority)
+    }
+
+    /// Torsional and rolling friction [m]; a shape that is no geom of MuJoCo's has none.
+    pub fn turning_mu(&self) -> [f64; 2] {
+        self.geom
+            .map_or([0.0; 2], |geom| [geom.friction[1], geom.friction[2]])
+    }
+}
+
 /// What decides, besides the shapes, which pairs touch.
 pub(in crate::compile) struct Rules<'a> {
     /// Groups of links that a joint connects.
@@ -297,6 +310,8 @@ fn piece(
         solid: Solid {
             kind,
             shape: b.number,
+            link: b.link,
+            friction: [b.surface.mu, b.turning_mu()[0], b.turning_mu()[1]],
             body: b.body,
             axes,
             is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

@@ -24,12 +24,14 @@ mod narrow;
 mod primitive;
 mod variables;
 
+use super::params::param;
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::Cone;
 use crate::constants::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, pair,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, Solid, WEIGHT_MIN, pair,
+    rule, surface,
 };
 use crate::constants::pair_groups::BLOCK;
 use crate::constants::params::Param;
@@ -86,9 +88,8 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
         cx.fill_all(memory.poses, row, 3, axes[1].0);
         cx.fill_all(memory.poses, row, 6, axes[2].0);
         cx.fill_all(memory.poses, row, 9, center.0);
-        // friction of shapes where it differs per world
-        if let Some(first) = m.varying.first(Param::ShapeMu) {
-            cx.fill(memory.mu, row, 0, b.params[first + solid.shape]);
+        if m.contacts.varying.any() {
+            place_surface(cx, m, &b.params, solid, row);
         }
     }
     // origins: the reference point of each tree
@@ -99,6 +100,32 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     // static shapes are relative to the origin of the world, the last row
     let world = cx.at(w.reference.len());
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
+}
+
+/// Writes what differs per world of a shape's surface and body.
+#[inline(always)]
+fn place_surface<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    params: &[C::F],
+    solid: &Solid<<C::F as Num>::Real>,
+    row: C::I,
+) {
+    let (table, varying) = (m.contacts.memory.mu, m.contacts.varying);
+    let columns = [
+        (varying.mu, Param::ShapeMu, surface::MU),
+        (varying.turning, Param::ShapeMuTorsional, surface::TORSION),
+        (varying.turning, Param::ShapeMuRolling, surface::ROLLING),
+    ];
+    for (_, which, column) in columns.into_iter().filter(|(varies, ..)| *varies) {
+        let mu = param(m, params, which, solid.shape, solid.friction[column]);
+        cx.fill(table, row, column, mu);
+    }
+    if let (true, Some(first)) = (varying.weight, m.varying.first(Param::BodyInvweight0)) {
+        // what stands still has no inverse weight
+        let weight = solid.link.map_or(C::F::c(0.0), |link| params[first + link]);
+        cx.fill(table, row, surface::WEIGHT, weight);
+    }
 }
 
 /// Adds the contacts of all pairs of two kinds.
@@ -343,21 +370,66 @@ fn boxes_overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
-/// Coefficient of friction of a pair where those of shapes vary.
+/// A column of the surfaces of a pair's two shapes.
 #[inline(always)]
-fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I) -> C::F {
+fn surfaces<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    column: usize,
+) -> (C::F, C::F) {
     let (indices, table) = (t.handles.pair_indices, t.memory.mu);
-    // friction of both shapes, in each world
     let a = cx.index(indices, p, pair::SOLID_A, table.rows);
     let b = cx.index(indices, p, pair::SOLID_B, table.rows);
-    let (a, b) = (cx.load(table, a, 0), cx.load(table, b, 0));
+    (cx.load(table, a, column), cx.load(table, b, column))
+}
+
+/// Coefficient of friction of a pair where those of shapes vary: of sliding, torsion or rolling, by its column.
+#[inline(always)]
+fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I, column: usize) -> C::F {
+    let (a, b) = surfaces(cx, t, p, column);
     let mut mu = t.combine.coefficient(a, b);
-    // some pairs keep the larger coefficient, however the others combine theirs
+    // some pairs have the larger coefficient, however the others combine theirs, or that of one shape, or their own
     if t.keeps_max.rows > 0 {
-        let keeps = C::F::c(0.5).lt(cx.constant(t.keeps_max, p, 0));
-        mu = C::F::select(keeps, a.max(b), mu);
+        let rule = cx.constant(t.keeps_max, p, 0);
+        // rules are whole: a half keeps the comparison clear of rounding
+        let is_at_least = |least: f64| C::F::c(least - 0.5).lt(rule);
+        mu = C::F::select(is_at_least(rule::LARGER), a.max(b), mu);
+        if t.has_rules {
+            mu = C::F::select(is_at_least(rule::FIRST), a, mu);
+            mu = C::F::select(is_at_least(rule::SECOND), b, mu);
+            let mut of_pair = cx.constant(t.handles.pair_numbers, p, pair::MU);
+            if column != surface::MU && t.turning.rows > 0 {
+                of_pair = of_pair * cx.constant(t.turning, p, column - surface::TORSION);
+            }
+            mu = C::F::select(is_at_least(rule::OWN), of_pair, mu);
+        }
     }
     mu.max(C::F::c(MU_MIN))
+}
+
+/// Torsional and rolling friction over that of sliding, and the inverse weight of both bodies, where one of them varies.
+#[inline(always)]
+fn varying<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    mu: Option<C::F>,
+) -> Option<[C::F; 3]> {
+    if !t.varying.turning && !t.varying.weight {
+        return None;
+    }
+    let mut scalars = [C::F::c(0.0); 3];
+    if t.varying.turning {
+        let mu = mu.unwrap_or(cx.constant(t.handles.pair_numbers, p, pair::MU));
+        scalars[0] = friction(cx, t, p, surface::TORSION).div(mu);
+        scalars[1] = friction(cx, t, p, surface::ROLLING).div(mu);
+    }
+    if t.varying.weight {
+        let (a, b) = surfaces(cx, t, p, surface::WEIGHT);
+        scalars[2] = (a + b).max(C::F::c(WEIGHT_MIN));
+    }
+    Some(scalars)
 }
 
 /// The list of a pair's contacts. Its rows count from the reference point of the pair's class.
@@ -379,16 +451,15 @@ fn points_of<C: Cx>(
     let [first_end, capacity_end] = t.row_ends();
     let first = cx.index(t.handles.class_rows, class, 0, first_end);
     let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
+    let mu = t.varying.mu.then(|| friction(cx, t, p, surface::MU));
     Points {
         list: cx.kept(t.memory.counts, class, first, capacity),
         table: t.memory.rows,
         pair: cx.number(p),
         base: (center_a + (origin_a - origin)),
         flip: cx.constant(scalars, p, pair::FLIP),
-        mu: match t.memory.mu.rows {
-            0 => None,
-            _ => Some(friction(cx, t, p)),
-        },
+        mu,
+        varying: varying(cx, t, p, mu),
         // the forces of a pyramidal cone depend on the tangents' direction
         along: (t.cone == Cone::Pyramidal).then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {

@@ -160,8 +160,15 @@ impl<'a, C: Cx> Contact<'a, C> {
     fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
         let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
         // friction of torsion and of rolling over that of sliding
-        let twist = cx.pick(t.turning, self.pair, 0) * self.rubs;
-        let roll = cx.pick(t.turning, self.pair, 1) * self.rubs;
+        let [twist, roll] = [0, 1].map(|k| {
+            let mut ratio = cx.pick(t.turning, self.pair, k);
+            // where it varies, a ratio above 0 only says that the pair has this friction
+            if t.varying.turning {
+                let varied = cx.load(t.memory.rows, self.row, row::VARYING + k);
+                ratio = C::F::select(zero.lt(ratio), varied, zero);
+            }
+            ratio * self.rubs
+        });
         let scales = [twist, roll, roll];
         let mut velocity = [zero; 3];
         // J(i, dof) = ± scale (axis · ω)
@@ -242,13 +249,16 @@ impl<'a, C: Cx> Contact<'a, C> {
         let position = distance - self.of_pair(cx, pair::MARGIN);
         let d = self.impedance(cx, m, position);
         // μ of the pair, or that of the contact where it varies, and 0 without friction
-        let mu = match t.memory.mu.rows {
-            0 => self.of_pair(cx, pair::MU),
-            _ => cx.load(t.memory.rows, r, row::MU),
+        let mu = match t.varying.mu {
+            false => self.of_pair(cx, pair::MU),
+            true => cx.load(t.memory.rows, r, row::MU),
         };
         let mu = mu * self.rubs;
         // D₀ = d / ((1 - d) w), aref = -b v - k d (r - margin) along the normal
-        let weight = self.of_pair(cx, pair::WEIGHT);
+        let weight = match t.varying.weight {
+            false => self.of_pair(cx, pair::WEIGHT),
+            true => cx.load(t.memory.rows, r, row::VARYING + 2),
+        };
         let stiff = d.div((one - d) * weight);
         let damping = self.of_pair(cx, pair::DAMPING);
         let spring = self.of_pair(cx, pair::STIFFNESS) * d * position;

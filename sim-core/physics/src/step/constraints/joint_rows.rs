@@ -9,8 +9,10 @@
 //! is compiled. Only the side of a limit is found at run time.
 
 use crate::arrays::Array as A;
+use crate::constants::params::Param;
 use crate::constants::{Impedance, Soft};
 use crate::lane::{Cx, Num, Real};
+use crate::step::params::param;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 use crate::when;
 
@@ -41,7 +43,8 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let position = multiplier.fnma(cx.get(&b.joint_q[leading]), cx.get(&b.joint_q[following]))
             - C::F::k(equality.offset);
         let velocity = multiplier.fnma(cx.get(&b.joint_qd[l]), cx.get(&b.joint_qd[f]));
-        let (weight, aref) = soft_row(&equality.soft, position, velocity);
+        let inverse_weight = C::F::k(equality.soft.inverse_weight);
+        let (weight, aref) = soft_row(&equality.soft, inverse_weight, position, velocity);
         cx.set(&mut b.efc_weight[row], weight);
         cx.set(&mut b.efc_aref[row], aref);
         row += 1;
@@ -70,7 +73,9 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for (n, limit) in m.limits.iter().enumerate() {
             // side × q̇ is the rate of r
             let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
-            let (weight, aref) = soft_row(&limit.soft, distance[n], velocity);
+            let fixed = limit.soft.inverse_weight;
+            let inverse_weight = param(m, &b.params, Param::DofInvweight0, limit.dof, fixed);
+            let (weight, aref) = soft_row(&limit.soft, inverse_weight, distance[n], velocity);
             // other worlds of the block may be inside their range
             let active = distance[n].lt(zero);
             cx.set(
@@ -105,10 +110,10 @@ fn powered<F: Num>(x: F, power: f64) -> F {
 
 /// (D, aref) of a row at this position and velocity.
 #[inline(always)]
-fn soft_row<F: Num>(soft: &Soft<F::Real>, position: F, velocity: F) -> (F, F) {
+fn soft_row<F: Num>(soft: &Soft<F::Real>, inverse_weight: F, position: F, velocity: F) -> (F, F) {
     // D = d / ((1 - d) × inverse weight)
     let d = impedance(&soft.impedance, position);
-    let weight = d.div((F::c(1.0) - d) * F::k(soft.inverse_weight));
+    let weight = d.div((F::c(1.0) - d) * inverse_weight);
     // aref = -b v - k d r
     let spring = F::k(soft.stiffness) * d * position;
     (weight, -velocity.fma(F::k(soft.damping), spring))

@@ -15,6 +15,7 @@ use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
+use crate::step::masses;
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage, param};
 
@@ -179,7 +180,8 @@ fn add_link_forces<F: Num>(
             let given = &params[first + 6 * link..first + 6 * link + 6];
             let force = Vec3([given[0], given[1], given[2]]);
             let torque = Vec3([given[3], given[4], given[5]]);
-            let point = w.rotation[body].mul_add(Vec3::constant(frame.center), w.origin[body]);
+            let center = masses::center_of_frame(m, params, link, frame.center);
+            let point = w.rotation[body].mul_add(center, w.origin[body]);
             link_forces::add(w, body, point, force, torque);
         }
     }

@@ -47,7 +47,7 @@ pub(in crate::step) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     link_forces::clear(w);
     for held in &m.compensation.links {
         // -s m g at the centre of mass, with the mass that the link has in each world
-        let center = Vec3::constant(held.center);
+        let center = masses::center_of_frame(m, params, held.link, held.center);
         let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
         let mass = masses::mass(m, params, held.link, held.mass);
         let force = up * (mass * C::F::k(held.share));

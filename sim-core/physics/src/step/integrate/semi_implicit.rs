@@ -225,6 +225,10 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     let (body, dt) = (&m.bodies[k], C::F::k(m.dt));
     let (d, params, joint_qd) = (body.dof, &b.params, &b.joint_qd);
     let (rotation, acceleration) = (&b.work.rotation[k], &mut b.work.acceleration);
+    // the centre of mass, which may be another one than that of the body's velocity
+    let scene_center = Vec3::constant(body.center);
+    let moved = masses::moved_center(m, params, body);
+    let center = moved.unwrap_or(scene_center);
     // ω, and α before the correction
     let (mut spin, mut angular) = (Vec3::zero(), Vec3::zero());
     for i in 0..3 {
@@ -235,13 +239,13 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     let trace: f64 = body.inertia[..3].iter().map(|x| x.to_f64()).sum();
     let unit = C::F::c(1.0 / trace);
     // L = J ω
-    let momentum = rotated_inertia(m, params, body, rotation, spin) * unit;
+    let momentum = rotated_inertia(m, params, body, rotation, center, spin) * unit;
     let mut columns = [Vec3::zero(); 3];
     // columns of A + h ∂(ω × L)/∂ω: J e + h (e × L + ω × J e)
     for (i, column) in columns.iter_mut().enumerate() {
         let mut axis = Vec3::zero();
         axis[i] = C::F::c(1.0);
-        let inertia = rotated_inertia(m, params, body, rotation, axis) * unit;
+        let inertia = rotated_inertia(m, params, body, rotation, center, axis) * unit;
         let rate = axis.cross_add(momentum, spin.cross(inertia));
         *column = rate.scale_add(dt, inertia);
         // A has armature and h damping on the diagonal
@@ -252,19 +256,28 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
         column[i] = driven.fma(unit, column[i]);
     }
     // -h (α × L + ω × J α)
-    let inertia = rotated_inertia(m, params, body, rotation, angular) * unit;
+    let inertia = rotated_inertia(m, params, body, rotation, center, angular) * unit;
     let rate = angular.cross_add(momentum, spin.cross(inertia));
     let change = rate * -dt;
     // Cramer's rule: the rows of the inverse are cross products of columns over the determinant
     let [x, y, z] = columns;
     let minors = [y.cross(z), z.cross(x), x.cross(y)];
     let determinant = x.dot(minors[0]);
+    let before = angular;
     for i in 0..3 {
         angular[i] = angular[i] + minors[i].dot(change).div(determinant);
     }
     // S(α) = α × (ω × r) + ω × (α × r) with r = R c
-    let arm = rotation * Vec3::constant(body.center);
+    let arm = rotation * center;
     let swing = angular.cross_add(spin.cross(arm), spin.cross(angular.cross(arm)));
+    // a(c') = a(c) + α × d + ω × (ω × d) changes by α where the centre c' is d away from c
+    if moved.is_some() {
+        let apart = rotation * (center - scene_center);
+        let turned = (angular - before).cross(apart);
+        for i in 0..3 {
+            acceleration[d + i] = acceleration[d + i] - turned[i];
+        }
+    }
     for i in 0..3 {
         // acceleration of the centre of mass; the step takes that of the origin, which differs by the swing
         acceleration[d + i] = dt.fnma(swing[i], acceleration[d + i]);
@@ -272,13 +285,14 @@ fn gyroscopic<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usiz
     }
 }
 
-/// J v in world axes, J the inertia about the centre of mass; of links whose masses vary, each about its own.
+/// J v in world axes, J the inertia about a centre; of links whose masses vary, each about its own.
 #[inline(always)]
 fn rotated_inertia<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     body: &Body<F::Real>,
     rotation: &Mat3<F>,
+    center: Vec3<F>,
     v: Vec3<F>,
 ) -> Vec3<F> {
     // in the body's axes, where J is constant
@@ -289,8 +303,7 @@ fn rotated_inertia<F: Num>(
     // J v = Σ s (J(link) v + m d × (v × d)), d the link's centre from the body's
     let mut sum = Vec3::zero();
     for part in &body.parts {
-        // about the centre that the scene has
-        let arm = Vec3::constant(part.center) - Vec3::constant(body.center);
+        let arm = masses::center(m, params, part) - center;
         let swing = arm.cross(v.cross(arm));
         let (mass, inertia) = masses::of_part(m, params, part);
         let product = swing.scale_add(mass, symmetric(inertia, v));

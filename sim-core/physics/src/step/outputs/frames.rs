@@ -12,13 +12,20 @@ use crate::constants::Constants;
 use crate::constants::site::Mount;
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
+use crate::step::masses;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
 /// Frames of bodies.
 pub struct Bodies;
 
 impl Stage for Bodies {
-    const READS: &'static [A] = &[A::Rotation, A::Origin, A::Reference, A::Orientation];
+    const READS: &'static [A] = &[
+        A::Params,
+        A::Rotation,
+        A::Origin,
+        A::Reference,
+        A::Orientation,
+    ];
     const WRITES: &'static [A] = &[A::Xpos, A::Xquat, A::Xmat, A::Xipos, A::Ximat];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
@@ -27,14 +34,15 @@ impl Stage for Bodies {
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let w = &mut b.work;
         for (k, body) in m.outputs.bodies.iter().enumerate() {
+            let center = masses::position(m, b, body);
+            let w = &mut b.work;
             w.xpos[k] = in_world(w, &body.frame);
             // (w, x, y, z) as in MuJoCo
             let [x, y, z, real] = orientation(w, &body.frame);
             w.xquat[k] = [real, x, y, z];
             w.xmat[k] = rows(&axes(w, &body.frame));
-            w.xipos[k] = in_world(w, &body.inertial);
+            w.xipos[k] = center + reference(w, &body.inertial);
             w.ximat[k] = rows(&axes(w, &body.inertial));
         }
     }

@@ -4,7 +4,6 @@
 //! cinert = (R I Rᵀ + m (|d|² 1 - d dᵀ), m d, m)        d: from the tree's centre of mass to the body's own
 //! ```
 
-use super::sites::position;
 use super::subtrees::root_center;
 use crate::arrays::Array as A;
 use crate::constants::Constants;
@@ -46,7 +45,7 @@ impl Stage for Inertias {
             }
             let mass = masses::mass(m, &b.params, body.link, body.mass);
             // d, the columns of R I Rᵀ, and m d
-            let d = position(&b.work, &body.inertial) - root_center(m, b, body);
+            let d = masses::position(m, b, body) - root_center(m, b, body);
             let x = masses::inertia_times(m, b, body, axis(0));
             let y = masses::inertia_times(m, b, body, axis(1));
             let z = masses::inertia_times(m, b, body, axis(2));

@@ -7,7 +7,7 @@
 //!
 //! x is the body's own centre of mass, c that of its subtree.
 
-use super::sites::{position, reference, velocity};
+use super::sites::{reference, velocity};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::lane::{Cx, Num, Real};
@@ -41,7 +41,7 @@ impl Stage for Momenta {
         let bodies = &m.outputs.bodies;
         // momenta, until the subtree is complete
         for (k, body) in bodies.iter().enumerate() {
-            let twist = velocity(&b.work, &body.inertial, position(&b.work, &body.inertial));
+            let twist = velocity(&b.work, &body.inertial, masses::position(m, b, body));
             b.work.subtree_linvel[k] =
                 twist[LINEAR] * masses::mass(m, &b.params, body.link, body.mass);
             // the spin itself turns the body about its centre of mass
@@ -61,7 +61,7 @@ impl Stage for Momenta {
         // L(b), children before parents; velocities of all subtrees are complete by now
         for (k, body) in bodies.iter().enumerate().rev() {
             // (x - c) × m (v(x) - v(b)): the body moves about the centre of mass of its subtree
-            let point = position(&b.work, &body.inertial);
+            let point = masses::position(m, b, body);
             let moving = velocity(&b.work, &body.inertial, point)[LINEAR];
             let mass = masses::mass(m, &b.params, body.link, body.mass);
             let w = &mut b.work;

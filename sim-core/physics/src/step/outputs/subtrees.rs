@@ -7,7 +7,7 @@
 //!
 //! Centres are kept from the reference point of each body's tree, so they keep their digits far from the origin.
 
-use super::sites::{position, reference};
+use super::sites::reference;
 use crate::arrays::{Array as A, Block};
 use crate::constants::Constants;
 use crate::constants::outputs::OutputBody;
@@ -37,13 +37,13 @@ impl Stage for Subtrees {
         for (k, body) in bodies.iter().enumerate() {
             let mass = masses::mass(m, &b.params, body.link, body.mass);
             b.work.subtree_mass[k] = mass;
-            b.work.subtree_center[k] = position(&b.work, &body.inertial) * mass;
+            b.work.subtree_center[k] = masses::position(m, b, body) * mass;
         }
-        let w = &mut b.work;
         // children before parents: when a body is reached, M c and M have its whole subtree
         for (k, body) in bodies.iter().enumerate().rev() {
+            let body_center = masses::position(m, b, body);
+            let w = &mut b.work;
             let (moment, mass) = (w.subtree_center[k], w.subtree_mass[k]);
-            let body_center = position(w, &body.inertial);
             // c = M c / M, or the centre of the body itself if the subtree has no mass
             let is_light = mass.lt(C::F::c(MASS_MIN));
             let inverse = C::F::c(1.0).div(mass.max(C::F::c(MASS_MIN)));

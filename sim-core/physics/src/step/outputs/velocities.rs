@@ -7,21 +7,21 @@
 use crate::arrays::Array as A;
 use crate::lane::Cx;
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial};
-use crate::math::vec3::Vec3;
+use crate::step::masses;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
 /// Link velocities for output.
 pub struct Velocities;
 
 impl Stage for Velocities {
-    const READS: &'static [A] = &[A::Rotation, A::Origin, A::Velocity];
+    const READS: &'static [A] = &[A::Params, A::Rotation, A::Origin, A::Velocity];
     const WRITES: &'static [A] = &[A::LinkCenter, A::BodyQd];
 
     #[inline(always)]
     fn run<C: Cx>(_cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let w = &mut b.work;
         for (k, frame) in m.frames.iter().enumerate() {
-            let center = Vec3::constant(frame.center);
+            let center = masses::center_of_frame(m, &b.params, k, frame.center);
             let Some(body) = frame.body else {
                 w.link_center[k] = center;
                 w.body_qd[k] = Spatial::zero();

@@ -70,7 +70,7 @@ impl Stage for Forces {
                 let given = &b.params[first + 6 * body.link..first + 6 * body.link + 6];
                 let force = Vec3([given[0], given[1], given[2]]);
                 let torque = Vec3([given[3], given[4], given[5]]);
-                let point = position(&b.work, &body.inertial);
+                let point = masses::position(m, b, body);
                 add(m, b, k, point, force, torque);
             }
         }
@@ -114,8 +114,8 @@ fn accelerate<F: Num, V>(
     // c and x, both from the reference point of the tree of the body
     let center = root_center(m, b, body);
     let mass = masses::mass(m, &b.params, body.link, body.mass);
+    let point = masses::position(m, b, body);
     let w = &mut b.work;
-    let point = position(w, &body.inertial);
     // a(c) - ω × v(c) for cacc, a(x) for F; a static body has only the acceleration that stands for gravity
     let (at_center, at_point, alpha, omega) = match body.frame.body {
         Some(carrier) => {

@@ -4,15 +4,24 @@ use super::param;
 use crate::arrays::{Block, Workspace};
 use crate::constants::outputs::OutputBody;
 use crate::constants::params::Param;
-use crate::constants::{Constants, Part};
+use crate::constants::{Body, Constants, Part};
 use crate::lane::Num;
+use crate::math::quat;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::outputs::sites::axes;
+use crate::step::outputs::sites::{self, axes};
+
+/// Least mass of a body that is divided by (MuJoCo: `mjMINVAL`) [kg].
+const MASS_MIN: f64 = 1e-15;
 
 /// Do masses or inertias of links vary?
 #[inline(always)]
 pub(in crate::step) fn vary<R>(m: &Constants<R>) -> bool {
-    let params = [Param::BodyMassScale, Param::BodyMass, Param::BodyInertia];
+    let params = [
+        Param::BodyMassScale,
+        Param::BodyMass,
+        Param::BodyInertia,
+        Param::BodyCom,
+    ];
     params.iter().any(|&param| m.varying.first(param).is_some())
 }
 
@@ -33,6 +42,82 @@ pub(in crate::step) fn of_part<F: Num>(
         _ => part.inertia.map(F::k),
     };
     (mass, inertia)
+}
+
+/// Centre of mass of a link in the body's frame [m].
+#[inline(always)]
+pub(in crate::step) fn center<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    part: &Part<F::Real>,
+) -> Vec3<F> {
+    match (
+        m.varying.first(Param::BodyCom),
+        part.link_axes,
+        part.link_origin,
+    ) {
+        // a client gives it in the link's axes: R c + o
+        (Some(first), Some(axes), Some(origin)) => {
+            let given = std::array::from_fn(|i| params[first + 3 * part.link + i]);
+            Mat3::constant(axes).mul_add(Vec3(given), Vec3::constant(origin))
+        }
+        _ => Vec3::constant(part.center),
+    }
+}
+
+/// Centre of mass of a body in its own frame, where those of links vary; elsewhere it counts as the one that the scene has [m].
+#[inline(always)]
+pub(in crate::step) fn moved_center<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    body: &Body<F::Real>,
+) -> Option<Vec3<F>> {
+    m.varying.first(Param::BodyCom)?;
+    // Σ s m c / Σ s m over the links, with each link's scale s
+    let (mut moment, mut whole) = (Vec3::zero(), F::c(0.0));
+    for part in &body.parts {
+        let mass = mass(m, params, part.link, part.mass);
+        moment = center(m, params, part).scale_add(mass, moment);
+        whole = whole + mass;
+    }
+    Some(moment * F::c(1.0).div(whole.max(F::c(MASS_MIN))))
+}
+
+/// As [`center`], of a link by its frame; `fixed` where it does not vary.
+#[inline(always)]
+pub(in crate::step) fn center_of_frame<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    link: usize,
+    fixed: [F::Real; 3],
+) -> Vec3<F> {
+    let frame = &m.frames[link];
+    match m.varying.first(Param::BodyCom) {
+        Some(first) => {
+            let given = std::array::from_fn(|i| params[first + 3 * link + i]);
+            let axes: Mat3<F> = quat::matrix(quat::constant(frame.quat));
+            axes.mul_add(Vec3(given), Vec3::constant(frame.position))
+        }
+        None => Vec3::constant(fixed),
+    }
+}
+
+/// Centre of mass of a link of a MuJoCo model, from the reference point of its robot [m].
+#[inline(always)]
+pub(in crate::step) fn position<F: Num, V>(
+    m: &Constants<F::Real>,
+    b: &Block<F, V>,
+    body: &OutputBody<F::Real>,
+) -> Vec3<F> {
+    let w: &Workspace<F> = &b.work;
+    match m.varying.first(Param::BodyCom) {
+        Some(first) => {
+            let given = std::array::from_fn(|i| b.params[first + 3 * body.link + i]);
+            let turn: Mat3<F> = axes(w, &body.frame);
+            turn.mul_add(Vec3(given), sites::position(w, &body.frame))
+        }
+        None => sites::position(w, &body.inertial),
+    }
 }
 
 /// What mass and inertia of a link are multiplied with; none where that does not vary.

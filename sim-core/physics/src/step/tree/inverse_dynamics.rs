@@ -32,14 +32,15 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
             let mut whole = Spatial::zero();
             for part in &body.parts {
                 let massed = masses::of_part(m, &b.params, part);
-                let wrench = newton_euler::<C::F>(massed, part.center, state);
+                let center = masses::center(m, &b.params, part);
+                let wrench = newton_euler::<C::F>(massed, center, state);
                 let scale = masses::scale(m, &b.params, part.link);
                 whole = wrench.scale_add(scale.unwrap_or(C::F::c(1.0)), whole);
             }
             whole
         } else {
             let massed = (C::F::k(body.mass), body.inertia.map(C::F::k));
-            newton_euler::<C::F>(massed, body.center, state)
+            newton_euler::<C::F>(massed, Vec3::constant(body.center), state)
         };
     }
     // from the leaves: τ = z · n or z · f, then the force goes on to the carrier
@@ -138,11 +139,11 @@ pub(in crate::step) fn proper_accelerations<C: Cx>(
 #[inline(always)]
 fn newton_euler<F: Num>(
     (mass, inertia): (F, [F; 6]),
-    center: [F::Real; 3],
+    center: Vec3<F>,
     (axes, omega, acceleration): (&Mat3<F>, Vec3<F>, Spatial<F>),
 ) -> Spatial<F> {
     // F = m (a + α × c + ω × (ω × c))
-    let center = axes * Vec3::constant(center);
+    let center = axes * center;
     let force = point_acceleration(acceleration, omega, center) * mass;
     // N = I α + ω × I ω + c × F: the first two in the body's axes, where I is constant
     let (spin, turn) = (

@@ -223,13 +223,15 @@ fn inertia<F: Num>(
     // the whole body at once, with its constant mass
     if !masses::vary(m) {
         let (mass, inertia) = (F::k(body.mass), body.inertia.map(F::k));
-        return Inertia::placed(mass, body.center, inertia, rotation, origin);
+        let center = Vec3::constant(body.center);
+        return Inertia::placed(mass, center, inertia, rotation, origin);
     }
     // I(b) = Σ s I(link), all about the same point, with each link's scale s
     let mut sum = Inertia::zero();
     for part in &body.parts {
         let (mass, inertia) = masses::of_part(m, params, part);
-        let link_inertia = Inertia::placed(mass, part.center, inertia, rotation, origin);
+        let center = masses::center(m, params, part);
+        let link_inertia = Inertia::placed(mass, center, inertia, rotation, origin);
         let scale = masses::scale(m, params, part.link);
         for (sum, entry) in sum.iter_mut().zip(*link_inertia) {
             *sum = entry.fma(scale.unwrap_or(F::c(1.0)), *sum);

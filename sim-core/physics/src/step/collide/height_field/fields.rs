@@ -257,6 +257,7 @@ fn candidates<C: Cx>(cx: &mut C, table: Table, out: &Points<C>) -> Points<C> {
         flip: -out.flip,
         // candidates take no room, and friction and tangents come with the contacts that are kept
         mu: None,
+        varying: None,
         along: None,
         room: Room {
             is_tight: false,

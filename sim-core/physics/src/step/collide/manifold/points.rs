@@ -19,6 +19,8 @@ pub struct Points<C: Cx> {
     pub flip: C::F,
     /// Coefficient of friction, where it varies [–].
     pub mu: Option<C::F>,
+    /// Torsional and rolling friction over that of sliding [m], and inverse weight [1/kg], where one of them varies.
+    pub varying: Option<[C::F; 3]>,
     /// Direction of the first tangent where it is not 0 [–]; none where tangents may have any direction.
     pub along: Option<Vec3<C::F>>,
     /// What a world has room for.
@@ -67,7 +69,7 @@ impl<C: Cx> Points<C> {
             mask
         };
         let (list, table, pair) = (&mut self.list, self.table, self.pair);
-        let (along, mu) = (self.along, self.mu);
+        let (along, mu, varying) = (self.along, self.mu, self.varying);
         // from the reference point of the rows, with the direction of normals that the rows have
         let (point, normal) = (self.base + point, normal * self.flip);
         push!(cx, *list, mask, fresh, {
@@ -77,6 +79,11 @@ impl<C: Cx> Points<C> {
             // optional scalars of the row: friction where it varies, the first tangent where its direction matters
             if let Some(mu) = mu {
                 cx.init(table, fresh, row::MU, mu);
+            }
+            if let Some(varying) = varying {
+                for (i, x) in varying.iter().enumerate() {
+                    cx.init(table, fresh, row::VARYING + i, *x);
+                }
             }
             if let Some(along) = along {
                 for (i, x) in along.iter().enumerate() {

@@ -10,7 +10,7 @@ use crate::math::quat;
 use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::Vec3;
 use crate::step::constraints::ties::length;
-use crate::step::outputs::frames::in_world;
+use crate::step::outputs::sites::reference;
 use crate::step::outputs::sites::{position, to_local};
 use crate::step::outputs::subtrees::root_center;
 use crate::step::tree::inverse_dynamics::{point_acceleration, proper_accelerations};
@@ -307,7 +307,8 @@ fn static_moment<C: Cx>(m: &ConstantsOf<C>, b: &BlockOf<C>) -> Vec3<C::F> {
     let bodies = m.outputs.bodies.iter();
     for body in bodies.filter(|body| body.frame.body.is_none()) {
         let mass = masses::mass(m, &b.params, body.link, body.mass);
-        sum = in_world(&b.work, &body.inertial).scale_add(mass, sum);
+        let center = masses::position(m, b, body) + reference(&b.work, &body.inertial);
+        sum = center.scale_add(mass, sum);
     }
     sum
 }
