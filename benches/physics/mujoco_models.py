@@ -31,7 +31,7 @@ import sys
 import tempfile
 import time
 import venv
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,24 +61,31 @@ SAMPLED = 128
 State = dict[str, NDArray[Any]]
 
 
-class Mjbatch:
-    """mjbatch, in a process of its own. `ask` names a method of benches/physics/mjbatch_side.py."""
+def mjbatch_python() -> Path:
+    """Python of the environment with mjbatch, which is made where it is missing."""
+    python = ENVIRONMENT / "bin/python"
+    if not python.exists():
+        print(f"installing mjbatch into {ENVIRONMENT.relative_to(REPOSITORY)}", flush=True)
+        venv.create(ENVIRONMENT, with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", REQUIREMENTS], check=True)
+    return python
 
-    def __init__(self, side: str = "physics/mjbatch_side.py") -> None:
-        python = ENVIRONMENT / "bin/python"
-        if not python.exists():
-            print(f"installing mjbatch into {ENVIRONMENT.relative_to(REPOSITORY)}", flush=True)
-            venv.create(ENVIRONMENT, with_pip=True)
-            subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", REQUIREMENTS], check=True)
-        program = REPOSITORY / "benches" / side
-        self._process = subprocess.Popen([python, program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+class Peer:
+    """A side in a process of its own. `ask` names a method of the class `Side` in its program."""
+
+    def __init__(self, name: str, command: Sequence[str | Path], environ: Mapping[str, str] | None = None) -> None:
+        self._name = name
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environ and os.environ | environ
+        )
         self.versions = self._answer()
 
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit("mjbatch ended; its error is above")
+            raise SystemExit(f"{self._name} ended; its error is above")
         return json.loads(line)
 
     def ask(self, do: str, **arguments: Any) -> dict[str, Any]:
@@ -91,6 +98,13 @@ class Mjbatch:
     def close(self) -> None:
         """End the process."""
         self._process.communicate()
+
+
+class Mjbatch(Peer):
+    """mjbatch, in an environment of its own; for `ask` see benches/physics/mjbatch_side.py."""
+
+    def __init__(self, side: str = "physics/mjbatch_side.py") -> None:
+        super().__init__("mjbatch", [mjbatch_python(), REPOSITORY / "benches" / side])
 
 
 class Native:

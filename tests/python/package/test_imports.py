@@ -54,7 +54,7 @@ LAYERS = (
     ("tightloop.view",),
     ("tightloop.env",),
     ("tightloop.tasks", "tightloop.adapters"),
-    ("tightloop.examples",),
+    ("tightloop.examples", "tightloop.mjlab"),
     ("tightloop.train",),
     ("tightloop.files.scenes",),
     ("tightloop.demo",),

@@ -10,6 +10,8 @@
 | `tightloop.adapters.ray` | Ray | `RayVectorEnv`, a vector environment over the nodes of a cluster | as asked for |
 | `tightloop.adapters.torchrun` | torchrun | `Rank`, with the share of the worlds of a process | as asked for |
 
+`tightloop.adapters.mjlab` is the other way round: mjlab's own tasks on tightloop's physics.
+
 The first four take a `tightloop.env.VectorEnv` or a `RayVectorEnv`, or a task and further arguments of `VectorEnv`.
 `register` takes a task. They return copies, which the library may keep or overwrite, also if the environment has
 ``copy=False``.
