@@ -3,6 +3,7 @@
 
 SHELL  := /bin/bash
 VENV   := .venv
+MJLAB  := .venv-mjlab
 PYTHON := $(VENV)/bin/python
 PIP    := $(PYTHON) -m pip --disable-pip-version-check
 PYTEST := $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir .
@@ -38,9 +39,9 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test test-all check check-format format docs pages test-rl test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
-  $(addprefix announce-,demo test test-all docs test-rl train bench-env coverage)
+  $(addprefix announce-,demo test test-all docs test-rl test-mjlab train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
 # The tour comes first because it draws within seconds. The wheel is all that is compiled: a program beside it would
@@ -99,6 +100,10 @@ pages: wheel $(VENV)/.dev ## the parts of docs/pages that repeat what the code s
 # Not part of `test`, which needs no torch. With several threads torch spins on busy cores.
 test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libraries, short trainings (installs 6 GB)
 	OMP_NUM_THREADS=1 $(PYTEST) tests/rl
+
+# Not part of `test-rl`: mjlab needs another rsl_rl and another MuJoCo than .venv.
+test-mjlab: announce-test-mjlab wheel $(MJLAB)/.wheel ## tasks of mjlab beside MuJoCo-Warp, four minutes (installs 6 GB)
+	OMP_NUM_THREADS=1 $(MJLAB)/bin/python -m pytest -c py-client/pyproject.toml --rootdir . tests/mjlab
 
 # Not part of `test`, which compares 25 worlds.
 test-ray: wheel $(VENV)/.dev ## a Ray cluster of three nodes with 3072 worlds, beside one daemon, and a killed node
@@ -252,6 +257,14 @@ $(addprefix $(VENV)/.,demo dev docs rl peers coverage wheels): $(VENV)/.%: py-cl
 	$(PIP) install --quiet -r $<
 	@touch $@
 
+$(MJLAB)/.mjlab: py-client/requirements-mjlab.txt | $(PYTHON)
+	$(PYTHON) -m venv $(MJLAB)
+	$(MJLAB)/bin/python -m pip --disable-pip-version-check install --quiet -r $<
+	@touch $@
+$(MJLAB)/.wheel: $(VENV)/.wheel $(MJLAB)/.mjlab
+	$(MJLAB)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
+	@touch $@
+
 # cargo-llvm-cov goes into .venv; the profile reader belongs to the Rust toolchain.
 LLVM_COV := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" cargo llvm-cov
 llvm-cov: | $(PYTHON)
@@ -270,6 +283,8 @@ announce-docs:
 	@.ci/needs docs && .ci/announce docs "demo dev docs" ""
 announce-test-rl:
 	@.ci/needs test-rl && .ci/announce test-rl "demo dev rl" ""
+announce-test-mjlab:
+	@.ci/needs test-mjlab && .ci/announce test-mjlab "demo" "" && .ci/announce test-mjlab mjlab "" $(MJLAB)
 announce-train:
 	@.ci/needs train && .ci/announce train "demo dev rl" ""
 announce-bench-env:

@@ -1,4 +1,4 @@
-"""What of the adapter to mjlab needs no mjlab; tests/mjlab has the rest."""
+"""Tests of the mjlab adapter that run without mjlab; tests/mjlab has the others."""
 
 from __future__ import annotations
 
@@ -36,3 +36,8 @@ def test_the_command_names_its_scripts(words: list[str], code: int) -> None:
     )
     assert done.returncode == code
     assert "usage: python -m tightloop.mjlab {train,play,list-envs,viz-nan}" in done.stdout + done.stderr
+
+
+def test_the_adapter_imports_neither_mjlab_nor_torch() -> None:
+    code = "import sys, tightloop.adapters.mjlab, tightloop.mjlab; print({'mjlab', 'torch', 'warp'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"

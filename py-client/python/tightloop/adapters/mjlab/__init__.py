@@ -1,7 +1,7 @@
 """mjlab with tightloop's physics: its tasks, managers, sensors and scripts, on the CPU.
 
->>> from tightloop.adapters import mjlab
->>> mjlab.install()  # before mjlab is imported
+>>> from tightloop.adapters.mjlab import install
+>>> install()  # before an environment is made
 >>> from mjlab.envs import ManagerBasedRlEnv
 
 `python -m tightloop.mjlab train …` does that for mjlab's own scripts.

@@ -43,7 +43,9 @@ class ModelFields:
     def expand(self, name: str) -> None:
         """Give a field a value per world; see `Expansions.get`."""
         dtype = np.float32 if np.asarray(self._expansions.of(name)).dtype == np.float64 else None
-        self._tensors[name] = torch.from_numpy(self._expansions.get(name, dtype))
+        # a tensor of inference would not count its writes
+        with torch.inference_mode(False):
+            self._tensors[name] = torch.from_numpy(self._expansions.get(name, dtype))
 
     def tensor(self, name: str) -> Any:
         """Return a field that was expanded, ``(worlds, ...)``, else None. Of constants it is a copy."""

@@ -26,6 +26,15 @@ class Simulation(simulations.Simulation):
         worlds: The simulation of tightloop.
     """
 
+    def __init__(self, num_envs: int, cfg: Any, model: Any = None, device: str = "cuda:0", **kwargs: Any) -> None:
+        # before Warp looks for the device
+        if torch.device(device).type != "cpu":
+            raise ArgumentError(
+                f"device {device}: mjlab's tensors are in the memory of the CPU with tightloop; use device='cpu', "
+                "or set CUDA_VISIBLE_DEVICES='' for mjlab's scripts"
+            )
+        super().__init__(num_envs, cfg, model, device, **kwargs)
+
     def _init_with_variants(self, spec: Any, variant_info: Any) -> None:
         names = ", ".join(name.rstrip("/") for name, _ in variant_info)
         raise ArgumentError(
@@ -33,11 +42,6 @@ class Simulation(simulations.Simulation):
         )
 
     def _finish_init(self) -> None:
-        if torch.device(self.device).type != "cpu":
-            raise ArgumentError(
-                f"device {self.device}: mjlab's tensors are in the memory of the CPU with tightloop; use device='cpu', "
-                "or set CUDA_VISIBLE_DEVICES='' for mjlab's scripts"
-            )
         # contacts and rows of MuJoCo-Warp stay empty, so they get no memory
         room = self.cfg.nconmax, self.cfg.njmax
         self.cfg.nconmax, self.cfg.njmax = max(self._mj_data.ncon, 1), max(self._mj_data.nefc, 1)
@@ -52,7 +56,7 @@ class Simulation(simulations.Simulation):
 
     @property
     def wp_data(self) -> Any:
-        """MuJoCo-Warp's data, with its kinematics at the present positions."""
+        """MuJoCo-Warp's data, with its kinematics at the present positions, until the next call also for `data`."""
         self._place()
         return self._wp_data
 
@@ -78,6 +82,7 @@ class Simulation(simulations.Simulation):
         self.worlds.forward()
         if self.worlds.touched.intersection(LIT):
             self._place()
+            self.worlds.bring()
 
     def step(self) -> None:
         """Advance all worlds by a time step. As with MuJoCo, derived fields then lag by that step."""
@@ -105,5 +110,6 @@ class Simulation(simulations.Simulation):
             warp_model.refit_bvh(self._wp_model, self._wp_data, context.render_context)
             warp_model.render(self._wp_model, self._wp_data, context.render_context)
             context.unpack_rgb()
+            self.worlds.bring()
         for sensor in context.raycast_sensors:
             self.worlds.cast(sensor)

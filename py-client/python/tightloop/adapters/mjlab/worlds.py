@@ -75,7 +75,10 @@ class Worlds:
             self._wanted -= {"geom_xpos", "geom_xmat"}
         self._params: set[str] = set()
         self._held: dict[str, Array] = {}
-        self._faulted = np.zeros(count, bool)
+        # worlds that are faulted, and those whose start is to be written even if they hold it already
+        self._faulted, self._reset = np.zeros(count, bool), np.zeros(count, bool)
+        # worlds with a state of mjlab's that is not finite
+        self._lost = np.zeros(count, bool)
         self._sent: dict[str, Array] = {}
         self._varied: dict[str, Array] | None = None
         self.touched: set[str] = set()
@@ -99,7 +102,10 @@ class Worlds:
             self._wanted.add(name)
             if self._sim is not None:
                 self._launched()
-                self.forward()
+                if self._frame is None:  # parameters were added, too, so that states are written again
+                    self.forward()
+                else:  # the others keep the values of the last call
+                    self._copy(self._frame, name)
         elif name in FILLED and self._frame is not None:
             self._copy(self._frame, name)
 
@@ -136,32 +142,39 @@ class Worlds:
             self._arrays[name][rows] = start
         for name in (*_FORCES, *_KEPT, "qacc", "sensordata"):
             self._arrays[name][rows] = 0.0
+        self._reset[rows] = True
 
     def cast(self, sensor: Any) -> None:
         """Let the rays of a sensor of mjlab meet the geoms at the state of the newest frame."""
-        assert self._frame is not None
-        if "body_q" not in self._launched_with[0]:
-            self._wanted.add("body_q")
-            self._launched()
+        self._wanted.add("body_q")
+        sim = self._launched()
+        if self._frame is None or not hasattr(self._frame, "body_q"):
             self.forward()
         groups = sensor.cfg.include_geom_groups
         chosen = None if groups is None else np.isin(np.arange(6), groups).astype(np.uint8)
-        found = self._launched().rays(
+        hits = sim.rays(
             sensor._ray_pnt.numpy(),
             sensor._ray_vec.numpy(),
             geomgroup=chosen,
             bodyexclude=np.broadcast_to(sensor._ray_bodyexclude.numpy(), sensor._ray_dist.shape),
             frame=self._frame,
         )
-        sensor._ray_dist.numpy()[:] = found.dist
-        sensor._ray_geomid.numpy()[:] = found.geomid
-        sensor._ray_normal.numpy()[:] = found.normal
+        sensor._ray_dist.numpy()[:] = hits.dist
+        sensor._ray_geomid.numpy()[:] = hits.geomid
+        sensor._ray_normal.numpy()[:] = hits.normal
+
+    def bring(self) -> None:
+        """Put the fields of the newest frame to mjlab's memory again, which MuJoCo-Warp's kinematics wrote over."""
+        if self._frame is not None:
+            for name in self.touched.intersection(FILLED):
+                self._copy(self._frame, name)
 
     def close(self) -> None:
-        """End the simulation."""
+        """End the simulation. Another call starts it again, from what mjlab's memory holds."""
         self._frame = None
         if self._sim is not None:
             self._sim.close()
+            self._sim, self._launched_with = None, (frozenset(), frozenset())
 
     def _launched(self) -> Sim:
         """The simulation with all fields and parameters that are wanted."""
@@ -202,16 +215,15 @@ class Worlds:
         if self._arrays["xfrc_applied"].any():
             self._params.add("body_f")
         sim = self._launched()
-        varied = self._fields.values(sim.shape_names)
-        if varied is not self._varied:
-            for name, values in varied.items():
-                self._send(sim, name, values)
-            self._varied = varied
-        if "body_f" in self._params:
-            self._send(sim, "body_f", self._arrays["xfrc_applied"])
-        changed = np.zeros(self._count, bool)
+        changed = self._reset.copy()
         for name in _STATE:
             changed |= self._differs(name)
+        self._lost[:] = False
+        if changed.any():
+            # a write refuses such a state, which stays in mjlab's memory alone; NaN always differs
+            finite = [np.isfinite(self._arrays[name][changed]).all(axis=1) for name in _STATE]
+            self._lost[changed] = ~np.logical_and.reduce(finite)
+            changed &= ~self._lost
         frozen = changed & self._faulted
         if frozen.any():
             self._frame = None
@@ -221,6 +233,13 @@ class Worlds:
             self._sent.pop("body_f", None)
             for name in (*_COMMANDS, "qfrc_applied"):
                 self._held.pop(name, None)
+        varied = self._fields.values(sim.shape_names)
+        if varied is not self._varied:
+            for name, values in varied.items():
+                self._send(sim, name, values)
+            self._varied = varied
+        if "body_f" in self._params:
+            self._send(sim, "body_f", self._arrays["xfrc_applied"])
         return sim, changed
 
     def _differs(self, name: str) -> Mask:
@@ -258,6 +277,7 @@ class Worlds:
         self._frame = called(sim, sim._client.write, whole | commands, changed, True)
         for name in _STATE:
             self._hold(name)
+        self._reset &= ~changed
 
     def _new_commands(self) -> dict[str, Mask]:
         """Commands that differ from what the worlds hold, with the worlds in which they do."""
@@ -273,7 +293,9 @@ class Worlds:
         if held is not None and np.array_equal(force, held) and not (acts and self._joints.has_free):
             return {}
         held = self._hold("qfrc_applied").astype(np.float64)
-        return {"joint_f": self._joints.forces(self._arrays["qpos"].astype(np.float64), held)}
+        qpos = self._arrays["qpos"].astype(np.float64)
+        qpos[self._lost] = self._start["qpos"]
+        return {"joint_f": self._joints.forces(qpos, held)}
 
     def _fill(self) -> None:
         """Bring a frame to mjlab's memory."""
@@ -281,11 +303,12 @@ class Worlds:
         assert frame is not None
         for name in (*_STATE, *self.touched.intersection(FILLED)):
             self._copy(frame, name)
+        self._arrays["qpos"][self._lost] = self._arrays["qvel"][self._lost] = np.nan
         for name in _STATE:
             np.copyto(self._held[name], self._arrays[name])
         self._faulted = (frame.status & FAULTED) != 0
         # mjlab's NaN guard and its terminations look there; the state stays the last good one
-        self._arrays["qacc"][self._faulted] = np.nan
+        self._arrays["qacc"][self._faulted | self._lost] = np.nan
 
     def _copy(self, frame: Frame, name: str) -> None:
         to = self._arrays[name]

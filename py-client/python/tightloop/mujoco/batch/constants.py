@@ -31,6 +31,9 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
         RuntimeError: MuJoCo refuses a simulation's values; the first such simulation. The others are done.
     """
     scratch = copy.copy(model)
+    if "body_ipos" in expansions.names:
+        # where it is set, MuJoCo takes the frame of the body for that of the inertia
+        scratch.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     data = mujoco.MjData(scratch)
     inputs = [name for name in expansions.names if name not in CONSTANTS and hasattr(model, name)]
     failed: str | None = None

@@ -34,7 +34,7 @@ _FRICTIONS = ("shape_mu", "shape_mu_torsional", "shape_mu_rolling")
 _SLIDING = 3
 #: Model fields that act.
 _VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, "geom_friction", *_SOFTNESS)
-#: What ``mj_setConst`` computes. A batch computes it for reading.
+#: What ``mj_setConst`` computes. All but `_SOFTNESS` is for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
     "actuator_acc0 cam_pos0 cam_poscom0 cam_mat0 light_pos0 light_poscom0 light_dir0"
