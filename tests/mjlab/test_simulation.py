@@ -133,6 +133,18 @@ def test_a_world_with_a_fault_is_flagged_alone_until_its_reset(value: float, sim
     assert after(fresh, 3)["qpos"][2].tobytes() == sim.data.qpos[2].numpy().tobytes()
 
 
+@pytest.mark.parametrize("name", ["ctrl", "qfrc_applied"])
+def test_a_fault_is_flagged_to_whom_asks_only_then(name: str, sim_of: Make) -> None:
+    sim = sim_of()
+    sim.step()
+    getattr(sim.data, name)[2] = float("nan")
+    sim.step()
+    assert NanGuard.detect_nans(sim.data).tolist() == [False, False, True, False]
+    sim.reset(torch.tensor([2]))
+    sim.step()
+    assert not NanGuard.detect_nans(sim.data).any()
+
+
 def test_a_field_that_is_not_filled_is_named(sim_of: Make) -> None:
     sim = sim_of()
     for name in ("efc", "contact", "qM"):

@@ -301,16 +301,17 @@ class Worlds:
         """Bring a frame to mjlab's memory."""
         frame = self._frame
         assert frame is not None
+        self._faulted = (frame.status & FAULTED) != 0
         for name in (*_STATE, *self.touched.intersection(FILLED)):
             self._copy(frame, name)
         self._arrays["qpos"][self._lost] = self._arrays["qvel"][self._lost] = np.nan
         for name in _STATE:
             np.copyto(self._held[name], self._arrays[name])
-        self._faulted = (frame.status & FAULTED) != 0
-        # mjlab's NaN guard and its terminations look there; the state stays the last good one
-        self._arrays["qacc"][self._faulted | self._lost] = np.nan
 
     def _copy(self, frame: Frame, name: str) -> None:
         to = self._arrays[name]
         if to.size:
             np.copyto(to, getattr(frame, name).reshape(to.shape))
+        if name == "qacc":
+            # mjlab's NaN guard and its terminations look there; the state stays the last good one
+            to[self._faulted | self._lost] = np.nan
