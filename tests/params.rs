@@ -124,6 +124,9 @@ fn parameters_at_their_start_change_nothing() {
         Param::BodyCom,
         Param::BodyInvweight0,
         Param::JointFriction,
+        // computed in the precision of the run
+        Param::ShapeSolref,
+        Param::ShapeSolimp,
     ];
     let exact: Vec<Param> = all.filter(|p| !others.contains(p)).collect();
     let model = arm(exact).compile().unwrap();
@@ -218,6 +221,9 @@ fn numbers_near_starts(model: &Model, param: Param, seeds: &[usize]) -> Vec<f64>
                 Param::JointFriction => share,
                 Param::JointFNoise | Param::JointTargetQNoise | Param::JointTargetQdNoise => 0.0,
                 Param::JointEffortLimit if *start == NO_LIMIT => 60.0 + 20.0 * share,
+                Param::JointRef => 0.1 * share,
+                // in its bounds
+                Param::ShapeSolimp => start * (0.9 + 0.1 * share),
                 _ => start * (0.8 + 0.5 * share),
             });
         }

@@ -240,6 +240,29 @@ that end begin anew.
             "ratio_per_core_s": "ratio per CPU second",
         },
     ),
+    "mjlab_tasks": Bench(
+        "mjlab's tasks, beside MuJoCo-Warp and mjbatch on two cores",
+        """mjlab's own environments and managers with another class of simulations behind them, on the CPU. Actions are
+random, and episodes that end begin anew.
+
+- MuJoCo C, behind mjbatch, computes in double precision. tightloop and MuJoCo-Warp compute in single precision.
+- A control step is four physics steps and an evaluation of all fields. The rest is mjlab's managers, in torch.
+- MuJoCo-Warp has few worlds only: a control step of 4096 takes it seconds.
+- `ratio` compares tightloop with the most worlds, the other ratio tightloop with as many worlds.
+""",
+        {
+            "task": "task",
+            "side": "side",
+            "worlds": "worlds",
+            "env_steps_per_s": "env steps/s",
+            "physics_ms": "physics [ms]",
+            "forward_ms": "evaluation [ms]",
+            "rest_ms": "managers [ms]",
+            "ratio_same_worlds": "ratio, same worlds",
+            "ratio": "ratio",
+            "asked_ratio": "asked",
+        },
+    ),
     "terrain": Bench(
         "Rough ground, beside MuJoCo on one thread",
         """gymnasium's ant with random controls, on a plane and on a height field. Its cells are 25 cm wide, and its

@@ -19,7 +19,7 @@ FORCE = 100.0
 @pytest.mark.parametrize("task", ["Mjlab-Velocity-Flat-Unitree-G1", "Mjlab-Velocity-Flat-Unitree-Go1"])
 def test_forces_at_feet_are_those_of_mujoco_c(task: str, env_of: Callable[..., Any]) -> None:
     # C has the model's own values
-    env = env_of(task, Ours, 4, left_out=("friction", "base_com"))
+    env = env_of(task, Ours, 4)
     model, sim = env.sim.mj_model, env.sim
     data, solved = mujoco.MjData(model), 0
     names = [name for name in (model.sensor(i).name for i in range(model.nsensor)) if "feet_ground" in name]

@@ -42,6 +42,7 @@ impl Couplings {
                 second: vec![term(equality.leader)],
                 offsets: [0.0; 2],
                 polynomial: [equality.offset, equality.multiplier, 0.0, 0.0, 0.0],
+                referred: [None; 2],
             });
         }
         for tie in &m.ties {

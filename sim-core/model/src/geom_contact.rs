@@ -54,6 +54,16 @@ impl GeomContact {
         self.contype & other.conaffinity != 0 || other.contype & self.conaffinity != 0
     }
 
+    /// Its share in a mixture with another one [–].
+    pub(crate) fn share(&self, other: &GeomContact) -> f64 {
+        match (self.solmix >= WEIGHT_MIN, other.solmix >= WEIGHT_MIN) {
+            (true, true) => self.solmix / (self.solmix + other.solmix),
+            (false, false) => 0.5,
+            (true, false) => 1.0,
+            (false, true) => 0.0,
+        }
+    }
+
     /// The parameters of a contact of two geoms (MuJoCo: `mj_contactParam`).
     pub(crate) fn combined(&self, other: &GeomContact) -> GeomContact {
         let decides = match self.priority.cmp(&other.priority) {
@@ -69,12 +79,7 @@ impl GeomContact {
                 ..*geom
             };
         }
-        let share = match (self.solmix >= WEIGHT_MIN, other.solmix >= WEIGHT_MIN) {
-            (true, true) => self.solmix / (self.solmix + other.solmix),
-            (false, false) => 0.5,
-            (true, false) => 1.0,
-            (false, true) => 0.0,
-        };
+        let share = self.share(other);
         GeomContact {
             condim: self.condim.max(other.condim),
             softness: self.softness.mixed(&other.softness, share),

@@ -37,6 +37,7 @@ pub struct Model {
     pub(crate) activation_names: Vec<String>,
     pub(crate) mocap_names: Vec<String>,
     pub(crate) equality_names: Vec<String>,
+    pub(crate) contact_pair_names: Vec<String>,
     pub(crate) keyframes: Vec<KeyState>,
     pub(crate) sensors: Vec<SensorInfo>,
     pub(crate) refused_sensors: Vec<String>,
@@ -138,6 +139,7 @@ impl Model {
                 sensors.map(|sensor| sensor.name.clone()).collect()
             }
             Axis::Actuators => self.actuator_names.clone(),
+            Axis::ContactPairs => self.contact_pair_names.clone(),
             Axis::Activations => self.activation_names.clone(),
             Axis::Mocaps => self.mocap_names.clone(),
             Axis::Equalities => self.equality_names.clone(),
@@ -237,6 +239,7 @@ impl Model {
             scan_rays: self.constants.scans.iter().map(HeightScan::rays).sum(),
             contact_sensors: self.contact_sensors.len(),
             actuators: self.actuator_names.len(),
+            contact_pairs: self.contact_pair_names.len(),
             activations: self.constants.actuators.activations,
             mocaps: self.constants.mocaps,
             equalities: self.constants.switches,

@@ -1,12 +1,7 @@
 //! Softness of a constraint as MuJoCo gives it: `solref` and `solimp`.
 
-use sim_physics::constants::Impedance;
+use sim_physics::constants::{IMPEDANCE_BOUNDS, Impedance, SOLREF_DEFAULT, WIDTH_MIN};
 
-/// MuJoCo's `mjMINIMP` and `mjMAXIMP`: bounds of an impedance [–].
-const IMPEDANCE_MIN: f64 = 1e-4;
-const IMPEDANCE_MAX: f64 = 0.9999;
-/// MuJoCo's `mjMINVAL`.
-const WIDTH_MIN: f64 = 1e-15;
 /// Largest exponent of an impedance [–]: the curve is a product of so many factors.
 pub(crate) const POWER_MAX: f64 = 16.0;
 
@@ -22,7 +17,7 @@ pub struct Softness {
 impl Default for Softness {
     fn default() -> Softness {
         Softness {
-            solref: [0.02, 1.0],
+            solref: SOLREF_DEFAULT,
             solimp: [0.9, 0.95, 0.001, 0.5, 2.0],
         }
     }
@@ -32,7 +27,6 @@ impl Softness {
     /// The impedance, its values in their bounds.
     pub(crate) fn impedance(&self) -> Impedance<f64> {
         let [d_min, d_max, width, midpoint, power] = self.solimp;
-        let bounded = |x: f64| x.clamp(IMPEDANCE_MIN, IMPEDANCE_MAX);
         let (mut d_min, mut d_max) = (bounded(d_min), bounded(d_max));
         let is_flat = d_min == d_max || width <= WIDTH_MIN;
         if is_flat {
@@ -50,10 +44,10 @@ impl Softness {
 
     /// Reference stiffness [1/s²] and damping [1/s]. Where `is_safe`, a time constant is at least two steps of `dt` [s].
     pub(crate) fn reference(&self, dt: f64, is_safe: bool) -> (f64, f64) {
-        let d_max = self.solimp[1].clamp(IMPEDANCE_MIN, IMPEDANCE_MAX);
+        let d_max = bounded(self.solimp[1]);
         let [first, second] = match self.solref {
             // as MuJoCo: one positive value alone has no meaning
-            [first, second] if (first > 0.0) != (second > 0.0) => Softness::default().solref,
+            [first, second] if (first > 0.0) != (second > 0.0) => SOLREF_DEFAULT,
             both => both,
         };
         if first <= 0.0 {
@@ -81,4 +75,10 @@ impl Softness {
             solimp: std::array::from_fn(|i| mix(self.solimp[i], other.solimp[i])),
         }
     }
+}
+
+/// An impedance in MuJoCo's bounds.
+fn bounded(x: f64) -> f64 {
+    let [least, most] = IMPEDANCE_BOUNDS;
+    x.clamp(least, most)
 }

@@ -104,6 +104,7 @@ fn replaces(param: Param) -> bool {
             | Param::BodyInertia
             | Param::ActuatorGain
             | Param::ActuatorBias
+            | Param::ActuatorForcerange
     )
 }
 

@@ -28,6 +28,7 @@ _DRAWS_MIN, _SHARE = 2, 0.5
 #: Parameters that a write replaces and that are other than 0 or 1 as a rule.
 _REPLACED = {
     "actuator_bias",
+    "actuator_forcerange",
     "actuator_gain",
     "body_inertia",
     "body_mass",

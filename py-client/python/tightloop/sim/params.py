@@ -44,9 +44,14 @@ class Params:
     ``body_inertia`` (worlds, bodies, 6) [kg·m²] count before ``body_mass_scale``; an inertia is about the centre of
     mass in the link's axes: xx, yy, zz, xy, xz, yz. ``body_com`` (worlds, bodies, 3) [m] is that centre.
     ``body_invweight0`` (worlds, bodies) [1/kg] and ``dof_invweight0`` (worlds, dofs) are MuJoCo's, which make contacts
-    and limits soft. ``shape_mu_torsional`` and ``shape_mu_rolling`` (worlds, shapes) [m] are of geoms of MuJoCo
-    models. ``actuator_gain`` and ``actuator_bias`` (worlds, actuators, 3) of
-    MuJoCo models are constant, factor of the length and factor of the velocity.
+    and limits soft. ``joint_limit_lower`` and ``joint_limit_upper`` (worlds, dofs) [rad or m] act where a joint has
+    limits. ``shape_solref`` (worlds, shapes, 2) and ``shape_solimp`` (worlds, shapes, 5) are MuJoCo's; the power stays.
+
+    Of MuJoCo models: ``joint_ref`` (worlds, dofs) [rad or m] is ``qpos0`` of hinges and slides. ``body_gravcomp``
+    (worlds, bodies) [–]. ``shape_mu_torsional`` and ``shape_mu_rolling`` (worlds, shapes) [m]. ``pair_friction``
+    (worlds, contact_pairs, 3) [–, m, m] is sliding, torsional and rolling. ``actuator_gain`` and ``actuator_bias``
+    (worlds, actuators, 3) are constant, factor of the length and factor of the velocity. ``actuator_forcerange``
+    (worlds, actuators, 2) [N or N·m] acts where an actuator has bounds.
 
     ``command_delay`` (worlds,) [substeps]: delay until ``joint_f`` and targets of a frame act, rounded up to whole
     substeps; at most ``Scene.command_delay_max``.

@@ -89,10 +89,11 @@ impl Input {
                 Per::Entry(entries) => (Axis::Size(entries), 1),
                 Per::Dof => (Axis::Dofs, 1),
                 Per::Body(parts) => (Axis::Bodies, parts),
-                Per::Shape => (Axis::Shapes, 1),
+                Per::Shape(parts) => (Axis::Shapes, parts),
                 Per::Site(parts) => (Axis::Sites, parts),
                 Per::ContactSensor => (Axis::ContactSensors, 1),
                 Per::Actuator(parts) => (Axis::Actuators, parts),
+                Per::ContactPair(parts) => (Axis::ContactPairs, parts),
             },
         }
     }

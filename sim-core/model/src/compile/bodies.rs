@@ -12,6 +12,7 @@ use crate::model::{RobotRange, SensorInfo, Start};
 use crate::pose::Pose;
 use sim_physics::constants::actuators::{ActuatorBound, Actuators, TendonBound};
 use sim_physics::constants::outputs::OutputFrames;
+use sim_physics::constants::params::Param;
 use sim_physics::constants::passive::{Drag, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::{Springs, Tendon};
@@ -45,6 +46,9 @@ pub(super) struct BodyBuilder {
     pub actuator_names: Vec<String>,
     pub mocap_names: Vec<String>,
     pub equality_names: Vec<String>,
+    pub contact_pair_names: Vec<String>,
+    /// Whether any link may be held against gravity, in some world.
+    pub any_link_is_held: bool,
     pub sensor_infos: Vec<SensorInfo>,
     pub refused_sensors: Vec<String>,
     /// First moment of what stands still in MuJoCo models [kg·m].
@@ -59,6 +63,7 @@ impl BodyBuilder {
     pub fn from_scene(scene: &Description) -> BodyBuilder {
         let mut builder = BodyBuilder {
             dt: scene.dt,
+            any_link_is_held: scene.params.contains(&Param::BodyGravcomp),
             ..BodyBuilder::default()
         };
         scene.robots.iter().for_each(|robot| builder.add(robot));
@@ -343,6 +348,9 @@ impl BodyBuilder {
             self.constraints.push(compiled);
         }
         self.switches += parts.equalities.len();
+        let pairs = parts.pairs.iter();
+        self.contact_pair_names
+            .extend(pairs.map(|pair| format!("{}/{}", robot.name, pair.name)));
         for (name, is_active) in &parts.equalities {
             self.equality_names.push(format!("{}/{name}", robot.name));
             self.start.eq_active.push(f64::from(u8::from(*is_active)));

@@ -1,7 +1,9 @@
 //! Constraint rows of a model: equalities, dry friction and limits, with softness from the mass at the reference pose.
 
 use crate::softness::Softness;
-use sim_physics::constants::{Constants, Equality, Friction, Impedance, Limit, Motion, Soft};
+use sim_physics::constants::{
+    Constants, Equality, FAR, Friction, Impedance, Limit, Motion, SOLREF_DEFAULT, Soft,
+};
 
 /// MuJoCo's default `solimp` (0.9, 0.95, 0.001, 0.5, 2).
 pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
@@ -11,8 +13,6 @@ pub(super) const IMPEDANCE: Impedance<f64> = Impedance {
     midpoint: 0.5,
     power: 2.0,
 };
-/// MuJoCo's default `solref`: time constant [s], damping ratio.
-const SOLREF: [f64; 2] = [0.02, 1.0];
 
 /// What the rows need of a dof's joint; mimic leaders already as dof numbers.
 #[derive(Clone, Copy, Default)]
@@ -34,18 +34,27 @@ pub(super) struct SoftJoint {
     pub safe_references: bool,
 }
 
+/// What of rows differs from world to world.
+#[derive(Clone, Copy)]
+pub(super) struct VaryingRows {
+    /// Dry friction.
+    pub friction: bool,
+    /// Ends of ranges.
+    pub limits: bool,
+}
+
 /// Constraint rows in MuJoCo's order.
 pub(super) fn add_rows(
     constants: &mut Constants<f64>,
     joints: &[DofJoint],
     inverse_weight: &[f64],
-    friction_varies: bool,
+    varying: VaryingRows,
 ) {
     let dt = constants.dt;
     for (dof, joint) in joints.iter().enumerate() {
         let weight = inverse_weight[dof];
         if let Some((leader, multiplier, offset)) = joint.mimic {
-            let soft = soft(SOLREF, weight + inverse_weight[leader], dt);
+            let soft = soft(SOLREF_DEFAULT, weight + inverse_weight[leader], dt);
             constants.equalities.push(Equality {
                 follower: dof,
                 leader,
@@ -55,12 +64,12 @@ pub(super) fn add_rows(
             });
         }
         let moves_freely = constants.bodies[constants.dofs[dof].body].motion == Motion::Free;
-        if (joint.friction > 0.0 || friction_varies) && !moves_freely {
+        if (joint.friction > 0.0 || varying.friction) && !moves_freely {
             let soft = match joint.soft {
                 Some(soft_joint) => {
                     own_soft(&soft_joint.friction, weight, dt, soft_joint.safe_references)
                 }
-                None => soft(SOLREF, weight, dt),
+                None => soft(SOLREF_DEFAULT, weight, dt),
             };
             // a friction row has no position: its impedance is d_min, its reference -b v
             let d_min = soft.impedance.d_min;
@@ -77,8 +86,9 @@ pub(super) fn add_rows(
         if let (Some([lower, upper]), Some(soft_joint)) = (joint.range, joint.soft) {
             let soft = own_soft(&soft_joint.limit, weight, dt, soft_joint.safe_references);
             let (lower, upper) = (lower + soft_joint.margin, upper - soft_joint.margin);
-            // where both sides may act at once, each has a row of its own
-            let sides = match lower < upper {
+            // where both sides may act at once, in some world, each has a row of its own
+            let may_meet = varying.limits && soft_joint.margin > 0.0;
+            let sides = match lower < upper && !may_meet {
                 true => vec![[lower, upper]],
                 false => vec![[lower, FAR], [-FAR, upper]],
             };
@@ -86,6 +96,7 @@ pub(super) fn add_rows(
                 dof,
                 lower,
                 upper,
+                margin: soft_joint.margin,
                 soft,
             });
             constants.limits.extend(rows);
@@ -94,14 +105,12 @@ pub(super) fn add_rows(
                 dof,
                 lower,
                 upper,
+                margin: 0.0,
                 soft: limit_soft(joint.limit_gains, weight, dt),
             });
         }
     }
 }
-
-/// An end of a range that no joint reaches [rad or m].
-pub(super) const FAR: f64 = 1e18;
 
 /// Softness as a model from MuJoCo has it.
 pub(super) fn own_soft(

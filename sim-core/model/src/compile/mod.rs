@@ -15,6 +15,7 @@ mod keyframes;
 mod masses;
 mod mocaps;
 mod output_frames;
+mod param_starts;
 mod passive;
 mod precompiled;
 mod scans;
@@ -27,7 +28,7 @@ use crate::description::Description;
 use crate::error::ModelError;
 use crate::model::{Model, Start};
 use bodies::BodyBuilder;
-use constraint_rows::{IMPEDANCE, add_rows};
+use constraint_rows::{IMPEDANCE, VaryingRows, add_rows};
 use contacts::add_contacts;
 use contacts::pieces::{PlacedShape, Rules, placed_shapes};
 use contacts::sensors::add_contact_sensors;
@@ -38,7 +39,7 @@ use sim_physics::constants::actuators::Actuators;
 use sim_physics::constants::contact::Contacts;
 use sim_physics::constants::options::{Integrator, Newton};
 use sim_physics::constants::outputs::OutputFrames;
-use sim_physics::constants::params::{Param, SceneStarts, Varying};
+use sim_physics::constants::params::{Param, Varying};
 use sim_physics::constants::passive::GravityCompensation;
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::Springs;
@@ -68,12 +69,16 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     let mut reference = inverse_weight::at_reference(&m, &builder.dof_names)?;
     take_inverse_weights(scene, &builder.robots, &mut reference);
     m.solver = newton(scene, &m, &builder, &reference);
-    let varies = scene.params.contains(&Param::JointFriction);
+    let varies = |param| scene.params.contains(&param);
+    let varying = VaryingRows {
+        friction: varies(Param::JointFriction),
+        limits: varies(Param::JointLimitLower) || varies(Param::JointLimitUpper),
+    };
     add_rows(
         &mut m,
         &builder.joints,
         &reference.dof_inverse_weight,
-        varies,
+        varying,
     );
     add_forces(&mut m, scene, &mut builder);
     let ties = add_ties(&mut m, std::mem::take(&mut builder.constraints));
@@ -87,7 +92,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
         search.classes = classes_of_roots(&search.roots, &m.contacts);
     }
     m.scans = scene.placed_scans(&builder.carriers, &m.contacts)?;
-    add_contact_sensors(&mut m, scene, &placed);
+    add_contact_sensors(&mut m, scene, &placed, &rules);
     add_params(&mut m, scene, &builder, &placed, &reference)?;
     model(scene, m, builder, reference)
 }
@@ -187,14 +192,7 @@ fn add_params(
     placed: &[PlacedShape<'_>],
     reference: &Reference,
 ) -> Result<(), ModelError> {
-    let starts = SceneStarts {
-        link_inverse_weights: reference.link_inverse_weight.clone(),
-        dof_inverse_weights: reference.dof_inverse_weight.clone(),
-        turning_mu: placed.iter().map(PlacedShape::turning_mu).collect(),
-        mu: placed.iter().map(|shape| shape.surface.mu).collect(),
-        contact_sensors: scene.sensed_shapes()?.len(),
-        ..masses::starts(scene)
-    };
+    let starts = param_starts::starts(scene, m, &builder.joints, placed, reference)?;
     for &param in &scene.params {
         let numbers = param.starts(m, &starts);
         m.varying.add(param, numbers);
@@ -245,6 +243,7 @@ fn model(
         body_names: builder.body_names,
         mocap_names: builder.mocap_names,
         equality_names: builder.equality_names,
+        contact_pair_names: builder.contact_pair_names,
         actuator_names: builder.actuator_names,
         sensors: builder.sensor_infos,
         refused_sensors: [builder.refused_sensors, sensors_of_centers(scene)].concat(),

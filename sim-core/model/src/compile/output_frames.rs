@@ -16,7 +16,16 @@ pub(super) fn add_frames(
     let first = frames.bodies.len();
     let mount = |on: &OnLink| mounted_on(carriers, on);
     for (link, inertia) in parts.frames.inertias.iter().enumerate() {
-        let mounted = |pose| mounted_on(carriers, &OnLink { link, pose });
+        let mounted = |pose| {
+            mounted_on(
+                carriers,
+                &OnLink {
+                    link,
+                    pose,
+                    is_inertial: false,
+                },
+            )
+        };
         frames.bodies.push(OutputBody {
             link: first_link + link,
             parent: first + parts.parents[link],

@@ -71,14 +71,18 @@ impl BodyBuilder {
         parts: &Precompiled,
         carriers: &[Carrier],
     ) {
+        let Some(compensations) = &parts.compensations else {
+            return;
+        };
         let first = self.frames.len() - robot.links.len();
         // frames are in the order of links
         for (place, link) in robot.link_order().into_iter().enumerate() {
-            let share = parts
-                .compensations
-                .iter()
-                .find(|(compensated, _)| *compensated == link);
-            let (Some(&(_, share)), Some(body)) = (share, carriers[link].body) else {
+            let mut compensations = compensations.iter();
+            let share = compensations.find(|(compensated, _)| *compensated == link);
+            // where shares vary, any link may be held
+            let share = share.map(|&(_, share)| share);
+            let share = share.or_else(|| self.any_link_is_held.then_some(0.0));
+            let (Some(share), Some(body)) = (share, carriers[link].body) else {
                 continue;
             };
             // one without mass may be given some

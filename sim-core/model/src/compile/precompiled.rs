@@ -1,10 +1,9 @@
 //! Robots that come compiled: whether they fit together, and the inverse weights that they bring.
 
 use super::inverse_weight::Reference;
-use crate::description::{Description, OnLink, Robot, Sense};
+use crate::description::{Description, Robot, Sense};
 use crate::error::ModelError;
 use crate::model::RobotRange;
-use crate::pose::Pose;
 use sim_physics::constants::params::Param;
 
 /// Puts MuJoCo's inverse weights in the place of ours, for the robots that it compiled.
@@ -37,16 +36,12 @@ pub(super) fn sensors_of_centers(scene: &Description) -> Vec<String> {
         let Some(parts) = &robot.precompiled else {
             continue;
         };
-        let is_inertial = |on: &OnLink| {
-            let inertia = parts.frames.inertias.get(on.link);
-            on.pose != Pose::identity() && inertia.is_some_and(|inertia| inertia.pose == on.pose)
-        };
         for sensor in &parts.sensors.all {
             let moves = match &sensor.sense {
                 Some(Sense::Frame { of, from, .. }) => {
-                    is_inertial(of) || from.as_ref().is_some_and(is_inertial)
+                    of.is_inertial || from.is_some_and(|from| from.is_inertial)
                 }
-                Some(Sense::Acceleration { of, .. }) => is_inertial(of),
+                Some(Sense::Acceleration { of, .. }) => of.is_inertial,
                 _ => false,
             };
             if moves {

@@ -1,13 +1,13 @@
 //! Constraints of MuJoCo models whose Jacobians are found at run time.
 
 use super::carrier::Carrier;
-use super::constraint_rows::{FAR, own_soft};
+use super::constraint_rows::own_soft;
 use super::contacts::clusters::path;
 use super::sites::mounted;
 use crate::description::{Constraint, ConstraintLaw, Measure};
 use sim_physics::constants::springs::Term;
 use sim_physics::constants::ties::{self, Frames, Lengths, Tie, TieLaw};
-use sim_physics::constants::{Body, Constants, Motion};
+use sim_physics::constants::{Body, Constants, FAR, Motion};
 
 /// Smallest inverse weight of a row (MuJoCo: `mjMINVAL`).
 const WEIGHT_MIN: f64 = 1e-15;
@@ -47,12 +47,14 @@ impl DofConstraint {
                 second,
                 offsets,
                 polynomial,
+                referred,
             } => {
                 let lengths = Lengths {
                     first: terms(first, dof_of),
                     second: terms(second, dof_of),
                     offsets: *offsets,
                     polynomial: *polynomial,
+                    referred: referred.map(|joint| joint.map(|joint| dof_of[joint])),
                 };
                 let both = lengths.first.iter().chain(&lengths.second);
                 let dofs = both.map(|term| term.dof).collect();

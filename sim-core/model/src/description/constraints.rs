@@ -29,6 +29,8 @@ pub enum Measure {
         offsets: [f64; 2],
         /// Coefficients of p, the constant first.
         polynomial: [f64; 5],
+        /// The joints whose references o₁ and o₂ are; none of tendons.
+        referred: [Option<usize>; 2],
     },
     /// How far a ball joint has turned [rad].
     Angle {

@@ -26,6 +26,8 @@ pub struct OnLink {
     pub link: usize,
     /// The frame in the link's.
     pub pose: Pose,
+    /// Whether it is at the link's centre of mass, along its axes of inertia.
+    pub is_inertial: bool,
 }
 
 /// Inertia of a link about its principal axes.

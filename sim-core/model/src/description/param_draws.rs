@@ -1,6 +1,7 @@
 //! Parameters that a reset draws: which values of them, and from which distribution.
 
 use super::joint::{Joint, TargetMode};
+use super::precompiled::Precompiled;
 use super::robot::Robot;
 use super::scene::Description;
 use crate::distribution::Distribution;
@@ -100,7 +101,13 @@ impl Description {
                         | Param::JointTargetQdNoise
                 );
                 let names = |(robot, joint, part): (&Robot, &Joint, usize)| {
-                    if not_of_free && joint.kind == JointKind::Free {
+                    let not_of_balls = matches!(
+                        param,
+                        Param::JointRef | Param::JointLimitLower | Param::JointLimitUpper
+                    );
+                    if (not_of_free || not_of_balls) && joint.kind == JointKind::Free
+                        || not_of_balls && joint.kind == JointKind::Ball
+                    {
                         return Vec::new();
                     }
                     let mut names =
@@ -119,9 +126,16 @@ impl Description {
                     let name = |link: usize| format!("{}/{}", robot.name, robot.links[link].name);
                     links.map(move |link| vec![robot.name.clone(), name(link)])
                 });
-                links.flat_map(|names| vec![names; n]).collect()
+                links
+                    .flat_map(|names| with_parts(param, names, n))
+                    .collect()
             }
-            Per::Shape => self.shape_names().into_iter().map(with_owners).collect(),
+            Per::Shape(n) => {
+                let names = self.shape_names().into_iter().map(with_owners);
+                names
+                    .flat_map(|names| with_parts(param, names, n))
+                    .collect()
+            }
             Per::Site(n) => {
                 let parts = |name: &String| match n {
                     1 => vec![vec![name.clone()]],
@@ -135,24 +149,39 @@ impl Description {
                     .collect()
             }
             Per::Actuator(n) => {
-                let models = self.robots.iter();
-                let models = models.filter_map(|robot| Some((robot, robot.precompiled.as_ref()?)));
-                let names = models.flat_map(|(robot, parts)| {
-                    let name = |element: &str| {
-                        vec![robot.name.clone(), format!("{}/{element}", robot.name)]
-                    };
+                let names = self.names_in_models(|parts| {
                     let actuators = parts.actuators.iter();
-                    actuators
-                        .map(move |actuator| name(&actuator.name))
-                        .collect::<Vec<_>>()
+                    actuators.map(|actuator| &actuator.name).collect()
                 });
-                names.flat_map(|names| vec![names; n]).collect()
+                names
+                    .flat_map(|names| with_parts(param, names, n))
+                    .collect()
+            }
+            Per::ContactPair(n) => {
+                let names = self
+                    .names_in_models(|parts| parts.pairs.iter().map(|pair| &pair.name).collect());
+                names
+                    .flat_map(|names| with_parts(param, names, n))
+                    .collect()
             }
             Per::ContactSensor => {
                 let sensors = self.contact_sensors.iter();
                 sensors.map(|sensor| vec![sensor.name.clone()]).collect()
             }
         }
+    }
+
+    /// Of elements of models from MuJoCo, the name of their robot, then their own.
+    fn names_in_models(
+        &self,
+        elements: fn(&Precompiled) -> Vec<&String>,
+    ) -> impl Iterator<Item = Vec<String>> + '_ {
+        let models = self.robots.iter();
+        let models = models.filter_map(|robot| Some((robot, robot.precompiled.as_ref()?)));
+        models.flat_map(move |(robot, parts)| {
+            let names = elements(parts).into_iter();
+            names.map(|name| vec![robot.name.clone(), format!("{}/{name}", robot.name)])
+        })
     }
 
     /// All dofs in order: robot, joint, and which one of the joint.
@@ -165,6 +194,24 @@ impl Description {
             })
         })
     }
+}
+
+/// Names of each of the `n` numbers that something of these names has: at last its own, where the parameter's parts have names.
+fn with_parts(param: Param, names: Vec<String>, n: usize) -> Vec<Vec<String>> {
+    let parts: &[&str] = match param {
+        Param::BodyCom => &["x", "y", "z"],
+        Param::ActuatorForcerange => &["lower", "upper"],
+        Param::ShapeSolref => &["timeconst", "dampratio"],
+        Param::ShapeSolimp => &["dmin", "dmax", "width", "midpoint"],
+        Param::PairFriction => &["slide", "torsion", "roll"],
+        _ => &[],
+    };
+    let of_number = |k: usize| {
+        let part = parts.get(k).zip(names.last());
+        let part = part.map(|(part, name)| format!("{name}.{part}"));
+        names.iter().cloned().chain(part).collect()
+    };
+    (0..n).map(of_number).collect()
 }
 
 /// The name of a shape after those of its robot or body and its link.

@@ -26,8 +26,8 @@ pub struct Precompiled {
     pub constraints: Vec<Constraint>,
     /// What the medium does to links.
     pub drags: Vec<Drag>,
-    /// Links that are held against gravity, each with its share of compensation.
-    pub compensations: Vec<(usize, f64)>,
+    /// Links that are held against gravity, each with its share of compensation; none where the model has no passive forces.
+    pub compensations: Option<Vec<(usize, f64)>>,
     /// Springs and dampers of tendons.
     pub tendons: Vec<Tendon>,
     /// Actuators.
@@ -107,8 +107,10 @@ pub struct Drag {
 }
 
 /// Two geoms that touch whatever else says that they do not (MuJoCo: `contact/pair`).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ContactPair {
+    /// Its name, unique in the robot.
+    pub name: String,
     /// Their links, each with the place of the geom among the link's shapes.
     pub geoms: [(usize, usize); 2],
     /// How they touch.

@@ -172,6 +172,22 @@ impl HeightField {
             triangles,
         }
     }
+
+    /// What rays meet in MuJoCo (`mj_rayHfield`): the surface, and the top of the box below it, at height 0.
+    pub fn ray_surface(&self) -> TriMesh {
+        let TriMesh {
+            mut vertices,
+            mut triangles,
+        } = self.surface();
+        let first = vertices.len() as u32;
+        let [x, y] = self.half;
+        vertices.extend([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]]);
+        triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        TriMesh {
+            vertices,
+            triangles,
+        }
+    }
 }
 
 /// Shape and scalars of a file of NumPy's format with two axes.

@@ -229,7 +229,8 @@ view! {
             "places": places,
         };
     Lengths<f64> as "Lengths":
-        Always { "first": first, "second": second, "offsets": offsets, "polynomial": polynomial };
+        Always { "first": first, "second": second, "offsets": offsets, "polynomial": polynomial }
+        => referred;
     Frames<f64> as "Frames":
         Always {
             "first": first,

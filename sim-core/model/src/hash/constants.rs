@@ -87,7 +87,8 @@ view! {
             "zone": zone,
         };
     Limit<f64> as "Limit":
-        Always { "dof": dof, "lower": lower, "upper": upper, "soft": soft };
+        Always { "dof": dof, "lower": lower, "upper": upper, "soft": soft }
+        => margin;
     Newton<f64> as "Newton":
         Always {
             "iterations": iterations,

@@ -32,7 +32,7 @@ view! {
         Later { "turning": turning }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
-        => are_stiff, impedances, bodies, has_rules, varying;
+        => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
     Handles as "Handles":
         Always {
             "pair_numbers": pair_numbers,
@@ -91,7 +91,7 @@ view! {
             "is_upright": is_upright,
             "center": center,
         }
-        => link, friction;
+        => link, friction, softness;
     Group as "Group":
         Always { "kinds": kinds, "first": first, "end": end };
     Pair as "Pair":

@@ -15,7 +15,8 @@ view! {
             "records": records,
             "pairs": pairs,
             "geoms": geoms,
-        };
+        }
+        => ranks;
     RayGeom<f64> as "RayGeom":
         Always { "at": at, "kind": kind, "size": size };
     Sensor<f64> as "Sensor":

@@ -49,7 +49,7 @@ impl View for Param {
 }
 
 /// How many parameters there were when places of parameters joined the text, and whenever more joined them.
-const GENERATIONS: [usize; 3] = [22, 26, 31];
+const GENERATIONS: [usize; 4] = [22, 26, 31, 39];
 
 impl View for Varying {
     /// The places have an entry for each parameter up to the end of the generation of the last that varies: a parameter that joins

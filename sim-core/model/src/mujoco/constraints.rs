@@ -117,13 +117,15 @@ impl Equalities<'_> {
         let follower = joint(self.firsts[k])?;
         let offset = reference(parts, follower);
         let mut inverse_weight = weight(parts, follower);
+        let mut leader = None;
         let (mut second, mut other, mut polynomial) = (Vec::new(), 0.0, [0.0; 5]);
         polynomial[0] = constant;
         if self.seconds[k] >= 0 {
-            let leader = joint(self.seconds[k])?;
-            second.push((leader, 1.0));
-            other = reference(parts, leader);
-            inverse_weight += weight(parts, leader);
+            let second_joint = joint(self.seconds[k])?;
+            leader = Some(second_joint);
+            second.push((second_joint, 1.0));
+            other = reference(parts, second_joint);
+            inverse_weight += weight(parts, second_joint);
             polynomial = [constant, multiplier, c2, c3, c4];
         }
         parts.constraints.push(Constraint {
@@ -132,6 +134,7 @@ impl Equalities<'_> {
                 second,
                 offsets: [offset, other],
                 polynomial,
+                referred: [Some(follower), leader],
             },
             law: ConstraintLaw::Equality(k),
             softness: self.softness[k],
@@ -163,6 +166,7 @@ impl Equalities<'_> {
                 second,
                 offsets: [lengths[first_tendon], other],
                 polynomial,
+                referred: [None; 2],
             },
             law: ConstraintLaw::Equality(k),
             softness: self.softness[k],
@@ -335,6 +339,7 @@ fn length(terms: &[(usize, f64)]) -> Measure {
         second: Vec::new(),
         offsets: [0.0; 2],
         polynomial: [0.0; 5],
+        referred: [None; 2],
     }
 }
 

@@ -43,6 +43,7 @@ pub(super) fn on_links(
         Ok(OnLink {
             link,
             pose: frame(places[k], turns[k]),
+            is_inertial: false,
         })
     });
     all.collect()

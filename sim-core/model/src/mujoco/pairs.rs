@@ -47,6 +47,7 @@ pub(super) fn add_pairs(
         return Ok(());
     }
     let count = pairs.len();
+    let names = names(file, "pair", count)?;
     let condims = file.integers("pair_dim", count)?;
     let softness = softness(file, "pair", count)?;
     let sliding = file.vectors::<2>("pair_solreffriction", count)?;
@@ -59,6 +60,7 @@ pub(super) fn add_pairs(
         };
         let [slide, _, twist, roll, _] = frictions[k];
         parts.pairs.push(ContactPair {
+            name: names[k].clone(),
             geoms: [first, second],
             contact: GeomContact {
                 contype: 1,

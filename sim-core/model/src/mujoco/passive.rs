@@ -12,18 +12,21 @@ fn is_off(file: &ModelFile) -> Result<bool, ModelError> {
     Ok(has_flag(file, "mjDSBL_SPRING")? && has_flag(file, "mjDSBL_DAMPER")?)
 }
 
-/// Links that are held against gravity, each with its share of compensation.
+/// Links that are held against gravity, each with its share of compensation; none where the model has no passive forces.
 pub(super) fn compensations(
     file: &ModelFile,
     bodies: usize,
-) -> Result<Vec<(usize, f64)>, ModelError> {
+) -> Result<Option<Vec<(usize, f64)>>, ModelError> {
     let shares = file.reals("body_gravcomp", bodies)?;
+    if is_off(file)? {
+        return Ok(None);
+    }
     // MuJoCo skips all of it where no share is positive
-    if is_off(file)? || !shares.iter().any(|&share| share > 0.0) {
-        return Ok(Vec::new());
+    if !shares.iter().any(|&share| share > 0.0) {
+        return Ok(Some(Vec::new()));
     }
     let shares = shares.into_iter().enumerate();
-    Ok(shares.filter(|&(_, share)| share != 0.0).collect())
+    Ok(Some(shares.filter(|&(_, share)| share != 0.0).collect()))
 }
 
 /// Least mass of a link on which the medium acts (MuJoCo: `mjMINVAL`) [kg].

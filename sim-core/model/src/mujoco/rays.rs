@@ -61,7 +61,7 @@ impl RayScene {
                 "mjGEOM_BOX" => Some(RayShape::Box([a, b, c])),
                 "mjGEOM_HFIELD" => {
                     let field = height_field(&file, own_meshes[geom])?;
-                    let tree = TriangleTree::new(&field.surface());
+                    let tree = TriangleTree::new(&field.ray_surface());
                     Some(RayShape::Mesh(Arc::new(tree)))
                 }
                 "mjGEOM_MESH" => Some(RayShape::Mesh(tree(own_meshes[geom])?)),

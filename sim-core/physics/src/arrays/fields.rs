@@ -107,6 +107,8 @@ pub enum Axis {
     ContactSensors,
     /// Actuators.
     Actuators,
+    /// Contact pairs that MuJoCo models name.
+    ContactPairs,
     /// Bodies that clients place.
     Mocaps,
     /// Equalities of MuJoCo models.
@@ -139,6 +141,7 @@ impl Axis {
             Axis::ScanRays => sizes.scan_rays,
             Axis::ContactSensors => sizes.contact_sensors,
             Axis::Actuators => sizes.actuators,
+            Axis::ContactPairs => sizes.contact_pairs,
             Axis::Mocaps => sizes.mocaps,
             Axis::Equalities => sizes.equalities,
             Axis::Activations => sizes.activations,
@@ -163,6 +166,7 @@ impl Axis {
             Axis::ScanRays => "scan_rays".into(),
             Axis::ContactSensors => "contact_sensors".into(),
             Axis::Actuators => "actuators".into(),
+            Axis::ContactPairs => "contact_pairs".into(),
             Axis::Mocaps => "mocaps".into(),
             Axis::Equalities => "equalities".into(),
             Axis::Activations => "activations".into(),

@@ -110,6 +110,10 @@ recast! {
         pub has_rules: bool,
         /// What of contacts differs from world to world.
         pub varying: VaryingSurfaces,
+        /// How the softness of two shapes combines, where it varies; see [`mixing`].
+        pub mixing: Fixed,
+        /// Row of each contact pair that models name in the table of surfaces, where its friction varies; 0 of other pairs.
+        pub named_pairs: Fixed,
         /// Whether capsules and boxes have the points of `collide::primitive::capsule_box`.
         pub two_point_capsule_boxes: bool,
         /// Impedances of pairs.
@@ -128,18 +132,31 @@ pub struct VaryingSurfaces {
     pub turning: bool,
     /// Inverse weights of bodies.
     pub weight: bool,
+    /// `solref` and `solimp`.
+    pub softness: bool,
+    /// Friction of contact pairs that models name.
+    pub pairs: bool,
 }
 
 impl VaryingSurfaces {
     /// Does any of them vary?
     pub fn any(self) -> bool {
-        self.mu || self.turning || self.weight
+        self.mu || self.turning || self.weight || self.softness
     }
 
     /// Columns of the table of surfaces: sliding friction is the first.
     pub fn columns(self) -> usize {
-        match self.turning || self.weight {
-            true => surface::COLUMNS,
+        match (self.softness, self.turning || self.weight) {
+            (true, _) => surface::COLUMNS,
+            (_, true) => surface::SOFTNESS,
+            _ => 1,
+        }
+    }
+
+    /// Kinds of friction in that table, of which sliding is the first.
+    pub fn frictions(self) -> usize {
+        match self.turning {
+            true => surface::WEIGHT,
             false => 1,
         }
     }
@@ -155,8 +172,38 @@ pub mod surface {
     pub const ROLLING: usize = 2;
     /// Inverse weight of the body [1/kg].
     pub const WEIGHT: usize = 3;
-    /// Their number.
-    pub const COLUMNS: usize = 4;
+    /// MuJoCo's `solref` and `solimp`.
+    pub const SOFTNESS: usize = 4;
+    /// Scalars of `solref`.
+    pub const SOLREF: usize = 2;
+    /// Scalars of `solimp`.
+    pub const SOLIMP: usize = 5;
+    /// Columns.
+    pub const COLUMNS: usize = SOFTNESS + SOLREF + SOLIMP;
+}
+
+/// Columns of the table of pairs by which the softness of two shapes becomes that of their contacts.
+pub mod mixing {
+    /// Share of the first shape in a mixture [–].
+    pub const SHARE: usize = 0;
+    /// Whose softness counts; see [`super::rule`].
+    pub const RULE: usize = 1;
+    /// 1 where friction keeps the damping of the scene, else 0.
+    pub const KEEPS_SLIDING: usize = 2;
+    /// Least time constant [s].
+    pub const LEAST_TIME: usize = 3;
+    /// Impedance of the pair in the scene: `d_min`, `d_max`, 1 / width, midpoint.
+    pub const IMPEDANCE: usize = 4;
+    /// Columns.
+    pub const COLUMNS: usize = 8;
+}
+
+/// Scalars of a contact's softness, where that varies: as in [`pair`] from its stiffness on, then the impedance.
+pub mod soft {
+    /// `d_min`, `d_max`, 1 / width, midpoint.
+    pub const IMPEDANCE: usize = 3;
+    /// Columns.
+    pub const COLUMNS: usize = 7;
 }
 
 /// Which friction of two shapes counts for a pair, where it varies.
@@ -169,7 +216,7 @@ pub mod rule {
     pub const FIRST: f64 = 2.0;
     /// That of the second shape.
     pub const SECOND: f64 = 3.0;
-    /// The pair's own, which does not vary.
+    /// The pair's own.
     pub const OWN: f64 = 4.0;
 }
 
@@ -283,6 +330,8 @@ recast! {
         pub link: Option<usize>,
         /// Coefficients of sliding [–], torsional and rolling friction [m].
         pub friction: [R; 3],
+        /// MuJoCo's `solref`, then `solimp`.
+        pub softness: [R; 7],
         /// The body that carries it, or none.
         pub body: Option<usize>,
         /// Its axes in the body's frame, or in the world: columns [–].
@@ -463,6 +512,8 @@ pub mod row {
     pub const AREF: usize = 10;
     /// Until the reference acceleration is known: torsional and rolling friction [m], and inverse weight [1/kg], where they vary.
     pub const VARYING: usize = AREF;
+    /// After these, where it varies, the contact's softness; see [`soft`](super::soft).
+    pub const SOFTNESS: usize = VARYING + 3;
     /// J a - aref (3) [m/s²].
     pub const JAR: usize = 13;
     /// The same somewhere else, or its change (3) [m/s²].
@@ -576,6 +627,8 @@ impl<R: Real> Contacts<R> {
             keeps_max: Fixed::default(),
             has_rules: false,
             varying: VaryingSurfaces::default(),
+            mixing: Fixed::default(),
+            named_pairs: Fixed::default(),
             two_point_capsule_boxes: false,
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),

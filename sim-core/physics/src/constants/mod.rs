@@ -366,6 +366,15 @@ recast! {
     }
 }
 
+/// Bounds of an impedance (MuJoCo: `mjMINIMP`, `mjMAXIMP`) [–].
+pub const IMPEDANCE_BOUNDS: [f64; 2] = [1e-4, 0.9999];
+/// Least width of an impedance that has one (MuJoCo: `mjMINVAL`) [m or rad].
+pub const WIDTH_MIN: f64 = 1e-15;
+/// MuJoCo's default `solref`: time constant [s], damping ratio [–].
+pub const SOLREF_DEFAULT: [f64; 2] = [0.02, 1.0];
+/// An end of a range that no joint reaches [rad or m].
+pub const FAR: f64 = 1e18;
+
 recast! {
     /// Range of a joint, soft on both sides.
     #[derive(Clone, Debug)]
@@ -376,6 +385,8 @@ recast! {
         pub lower: R,
         /// [rad or m]
         pub upper: R,
+        /// Distance from an end at which the limit acts, which both ends count already [rad or m].
+        pub margin: R,
         /// Softness.
         pub soft: Soft<R>,
     }

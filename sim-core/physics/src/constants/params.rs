@@ -2,6 +2,7 @@
 //!
 //! Those that a scene names (`Description::params` in `sim-model`) vary; the others are constants of the program.
 
+use super::actuators::Actuator;
 use super::{Constants, Dof, Sizes};
 
 /// What a parameter has a value for.
@@ -13,14 +14,16 @@ pub enum Per {
     Dof,
     /// Each link, and this many entries.
     Body(usize),
-    /// Each collision shape.
-    Shape,
+    /// Each collision shape, and this many entries.
+    Shape(usize),
     /// Each site, and this many entries.
     Site(usize),
     /// Each contact sensor.
     ContactSensor,
     /// Each actuator of MuJoCo models, and this many entries.
     Actuator(usize),
+    /// Each contact pair that MuJoCo models name, and this many entries.
+    ContactPair(usize),
 }
 
 /// One row of the table.
@@ -78,7 +81,7 @@ params! {
     JointTargetKe "joint_target_ke" Per::Dof, "N·m/rad or N/m" Some(0.0), "Proportional gain of the drive. Free joints have no drive.";
     JointTargetKd "joint_target_kd" Per::Dof, "N·m·s/rad or N·s/m" Some(0.0), "Derivative gain of the drive. Free joints have no drive.";
     JointEffortLimit "joint_effort_limit" Per::Dof, "N·m or N" Some(0.0), "Bound of the drive's force; 1e30 where there is none. Free joints have no drive.";
-    ShapeMu "shape_mu" Per::Shape, "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts, or what the scene's friction_combine makes of both.";
+    ShapeMu "shape_mu" Per::Shape(1), "–" Some(0.0), "Coefficient of sliding friction of each collision shape; of two shapes the larger counts, or what the scene's friction_combine makes of both.";
     CommandDelay "command_delay" Per::Entry(1), "substeps" Some(0.0), "Substeps from the start of a frame until its joint_f and targets act; a part of one counts as a whole one. Before the first have come, those of the reset act.";
     JointFNoise "joint_f_noise" Per::Dof, "N·m or N" Some(0.0), "Standard deviation of what is added to joint_f, drawn for each frame.";
     JointTargetQNoise "joint_target_q_noise" Per::Dof, "rad or m" Some(0.0), "Standard deviation of what is added to joint_target_q, drawn for each frame. Free joints have no drive.";
@@ -99,13 +102,21 @@ params! {
     BodyCom "body_com" Per::Body(3), "m" None, "Centre of mass of each link in its own axes. The point that the velocity of a free joint is of stays where the scene has it.";
     BodyInvweight0 "body_invweight0" Per::Body(1), "1/kg" Some(0.0), "Inverse weight of each link at the reference pose, MuJoCo's first `body_invweight0`: the softness of its contacts.";
     DofInvweight0 "dof_invweight0" Per::Dof, "1/(kg·m²) or 1/kg" Some(0.0), "Inverse inertia of each dof at the reference pose, as MuJoCo's: the softness of the limits of hinges and slides.";
-    ShapeMuTorsional "shape_mu_torsional" Per::Shape, "m" Some(0.0), "Coefficient of torsional friction of each geom of MuJoCo models. It counts where contacts have condim 4 or 6.";
-    ShapeMuRolling "shape_mu_rolling" Per::Shape, "m" Some(0.0), "Coefficient of rolling friction of each geom of MuJoCo models. It counts where contacts have condim 6.";
+    ShapeMuTorsional "shape_mu_torsional" Per::Shape(1), "m" Some(0.0), "Coefficient of torsional friction of each geom of MuJoCo models. It counts where contacts have condim 4 or 6.";
+    ShapeMuRolling "shape_mu_rolling" Per::Shape(1), "m" Some(0.0), "Coefficient of rolling friction of each geom of MuJoCo models. It counts where contacts have condim 6.";
+    JointRef "joint_ref" Per::Dof, "rad or m" None, "Position at which each hinge or slide leaves its link in place: MuJoCo's `qpos0`, 0 of robots from URDF. Balls and free joints have none.";
+    JointLimitLower "joint_limit_lower" Per::Dof, "rad or m" None, "Lower end of the range of each joint with limits; -1e30 where there are none.";
+    JointLimitUpper "joint_limit_upper" Per::Dof, "rad or m" None, "Upper end of the range of each joint with limits; 1e30 where there are none.";
+    BodyGravcomp "body_gravcomp" Per::Body(1), "–" None, "Share of its weight by which each link of MuJoCo models is held against gravity.";
+    ActuatorForcerange "actuator_forcerange" Per::Actuator(2), "N or N·m" None, "Least and largest force of each actuator of MuJoCo models that has bounds; -1e30 and 1e30 of others.";
+    ShapeSolref "shape_solref" Per::Shape(2), "s, –" None, "MuJoCo's `solref` of each shape: time constant and damping ratio of its contacts, or both negative.";
+    ShapeSolimp "shape_solimp" Per::Shape(5), "–" None, "MuJoCo's `solimp` of each shape: dmin, dmax, width [m], midpoint, power. The power stays as the scene has it.";
+    PairFriction "pair_friction" Per::ContactPair(3), "–, m, m" Some(0.0), "Sliding, torsional and rolling friction of each contact pair that MuJoCo models name.";
 }
 
 /// Least mass and inertia of a link over those of the scene [–].
 const MASS_SCALE_MIN: f64 = 1e-3;
-/// The effort limit of a drive without one [N·m or N].
+/// Effort limit of a drive, end of a range, or bound of a force where there is none.
 pub const NO_LIMIT: f64 = 1e30;
 
 impl Param {
@@ -122,16 +133,20 @@ impl Param {
             Per::Entry(n) => n,
             Per::Dof => sizes.dofs,
             Per::Body(n) => n * sizes.bodies,
-            Per::Shape => sizes.shapes,
+            Per::Shape(n) => n * sizes.shapes,
             Per::Site(n) => n * sizes.sites,
             Per::ContactSensor => sizes.contact_sensors,
             Per::Actuator(n) => n * sizes.actuators,
+            Per::ContactPair(n) => n * sizes.contact_pairs,
         }
     }
 
     /// Initial values of a world.
     pub fn starts(self, m: &Constants<f64>, scene: &SceneStarts) -> Vec<f64> {
         let of_dofs = |number: fn(&Dof<f64>) -> f64| m.dofs.iter().map(number).collect();
+        let of_actuators = |numbers: fn(&Actuator<f64>) -> Vec<f64>| {
+            m.actuators.all.iter().flat_map(numbers).collect()
+        };
         match self {
             Param::Gravity => m.gravity.to_vec(),
             Param::BodyMassScale => vec![1.0; m.frames.len()],
@@ -164,18 +179,21 @@ impl Param {
             Param::DofInvweight0 => scene.dof_inverse_weights.clone(),
             Param::ShapeMuTorsional => scene.turning_mu.iter().map(|mu| mu[0]).collect(),
             Param::ShapeMuRolling => scene.turning_mu.iter().map(|mu| mu[1]).collect(),
-            Param::ActuatorGain => m
-                .actuators
-                .all
-                .iter()
-                .flat_map(|actuator| actuator.gain)
-                .collect(),
-            Param::ActuatorBias => m
-                .actuators
-                .all
-                .iter()
-                .flat_map(|actuator| actuator.bias)
-                .collect(),
+            Param::JointRef => scene.references.clone(),
+            Param::JointLimitLower => scene.ranges.iter().map(|range| range[0]).collect(),
+            Param::JointLimitUpper => scene.ranges.iter().map(|range| range[1]).collect(),
+            Param::BodyGravcomp => scene.gravity_shares.clone(),
+            Param::ActuatorForcerange => of_actuators(|actuator| {
+                actuator
+                    .force_range
+                    .unwrap_or([-NO_LIMIT, NO_LIMIT])
+                    .to_vec()
+            }),
+            Param::ShapeSolref => scene.shape_solref.as_flattened().to_vec(),
+            Param::ShapeSolimp => scene.shape_solimp.as_flattened().to_vec(),
+            Param::PairFriction => scene.pair_frictions.as_flattened().to_vec(),
+            Param::ActuatorGain => of_actuators(|actuator| actuator.gain.to_vec()),
+            Param::ActuatorBias => of_actuators(|actuator| actuator.bias.to_vec()),
         }
     }
 
@@ -204,6 +222,18 @@ pub struct SceneStarts {
     pub dof_inverse_weights: Vec<f64>,
     /// Torsional and rolling friction of each shape [m].
     pub turning_mu: Vec<[f64; 2]>,
+    /// Position of each dof at which its joint leaves its link in place [rad or m].
+    pub references: Vec<f64>,
+    /// Range of each dof [rad or m].
+    pub ranges: Vec<[f64; 2]>,
+    /// Share of its weight by which each link is held against gravity [–].
+    pub gravity_shares: Vec<f64>,
+    /// MuJoCo's `solref` of each shape.
+    pub shape_solref: Vec<[f64; 2]>,
+    /// MuJoCo's `solimp` of each shape.
+    pub shape_solimp: Vec<[f64; 5]>,
+    /// Sliding [–], torsional and rolling friction [m] of each contact pair.
+    pub pair_frictions: Vec<[f64; 3]>,
 }
 
 /// The noise of each command, in the order `joint_f`, `joint_target_q`, `joint_target_qd`.
@@ -214,10 +244,20 @@ pub const COMMAND_NOISES: [Param; 3] = [
 ];
 
 /// Which parameters vary, and where their values are among those of a world.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Varying {
     first: [Option<usize>; Param::ALL.len()],
     starts: Vec<(Param, f64)>,
+}
+
+impl Default for Varying {
+    /// None varies.
+    fn default() -> Varying {
+        Varying {
+            first: [None; Param::ALL.len()],
+            starts: Vec::new(),
+        }
+    }
 }
 
 impl Varying {
@@ -249,6 +289,12 @@ impl Varying {
     /// Initial values of a world, each with its parameter.
     pub fn starts(&self) -> &[(Param, f64)] {
         &self.starts
+    }
+
+    /// Initial value at a place.
+    #[inline(always)]
+    pub fn start(&self, place: usize) -> f64 {
+        self.starts[place].1
     }
 
     /// Values per world.

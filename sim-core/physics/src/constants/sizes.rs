@@ -23,6 +23,8 @@ pub struct Sizes {
     pub contact_sensors: usize,
     /// Actuators.
     pub actuators: usize,
+    /// Contact pairs that MuJoCo models name.
+    pub contact_pairs: usize,
     /// Bodies that clients place.
     pub mocaps: usize,
     /// Equalities of MuJoCo models.

@@ -54,6 +54,8 @@ recast! {
         pub offsets: [R; 2],
         /// Coefficients of p, the constant first.
         pub polynomial: [R; 5],
+        /// The dofs of the joints whose references o₁ and o₂ are; none of tendons.
+        pub referred: [Option<usize>; 2],
     }
 }
 

@@ -22,6 +22,18 @@ pub(super) fn param<F: Num>(
     }
 }
 
+/// What value `k` of a parameter has over its initial value; none where it does not vary.
+#[inline(always)]
+pub(super) fn moved_by<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    param: Param,
+    k: usize,
+) -> Option<F> {
+    let place = m.varying.first(param)? + k;
+    Some(params[place] - F::c(m.varying.start(place)))
+}
+
 /// Gravity in world axes.
 #[inline(always)]
 pub(super) fn gravity<F: Num>(m: &Constants<F::Real>, params: &[F]) -> Vec3<F> {

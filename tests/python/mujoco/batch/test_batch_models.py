@@ -127,7 +127,7 @@ def test_values_that_tightloop_cannot_vary_are_refused_by_simulation_and_field()
         with pytest.raises(ValueError, match=r"body_mass.*`model/cart`"):
             batch.step()
         mass[3, 1] = 1.0
-        for field in ("timestep", "integrator", "body_iquat", "qpos0", "jnt_range"):
+        for field in ("timestep", "integrator", "body_iquat", "qpos_spring", "jnt_margin"):
             values, message = batch.expand(field), f"sim 2: {field} differs from the model's"
             own = getattr(model.opt, field, None)
             own = getattr(model, field) if own is None else np.array(own)

@@ -127,6 +127,49 @@ def test_contacts_that_sensors_show_are_mujocos(seed: int, cone: str) -> None:
         assert_sensors(case, seed, 1e-6)
 
 
+def pile(seed: int) -> str:
+    """Bodies with several geoms that lie in each other, of kinds that touch in one point, and pairs that are named."""
+    rng = np.random.default_rng(seed)
+    bodies, geoms = [], []
+    for body in range(6):
+        parts = []
+        for part in range(int(rng.integers(1, 5))):
+            name, pos = f"g{body}_{part}", " ".join(f"{x:.3f}" for x in rng.uniform(-0.15, 0.15, 3))
+            # a box touches a sphere in one point; it does not touch the floor
+            boxed = body == 3 and part == 0
+            shape = 'type="box" size=".1 .1 .1"' if boxed else f'contype="3" size="{rng.uniform(0.05, 0.12):.3f}"'
+            parts.append(f'<geom name="{name}" {shape} pos="{pos}"/>')
+            geoms.append((body, name))
+        where = " ".join(f"{x:.3f}" for x in rng.uniform(-0.1, 0.1, 3))
+        bodies.append(f'<body name="b{body}" pos="{where}"><freejoint/>{"".join(parts)}</body>')
+    named = {tuple(sorted(rng.choice(len(geoms), 2, replace=False))) for _ in range(4)}
+    pairs = [(geoms[a], geoms[b]) for a, b in named if geoms[a][0] != geoms[b][0]]
+    contact = "".join(f'<pair geom1="{b}" geom2="{a}"/>' for (_, a), (_, b) in pairs)
+    sensor = '<contact body1="b{}" num="{}" data="found force dist pos normal tangent"/>'
+    sensors = "".join(sensor.format(body, 1 + body) for body in range(6))
+    floor = '<geom name="floor" type="plane" size="3 3 .1" contype="0" conaffinity="2"/>'
+    world = floor + '<geom name="post" size=".1" pos="0 .05 0"/>'
+    return f"""<mujoco><option tolerance="0" iterations="100"/><worldbody>{world}{"".join(bodies)}</worldbody>
+      <contact>{contact}</contact><sensor>{sensors}<contact num="20" data="found dist pos"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_the_first_contacts_of_a_sensor_are_mujocos(seed: int) -> None:
+    model = mujoco.MjModel.from_xml_string(pile(seed))
+    with live(model, fields=("sensordata",)) as case:
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        values = case.sim.forward().sensordata[0]
+        left_out = 0
+        for sensor in range(model.nsensor):
+            first, number = model.sensor_adr[sensor], model.sensor_intprm[sensor, 2]
+            expected = data.sensordata[first : first + model.sensor_dim[sensor]].reshape(number, -1)
+            rows = values[first : first + model.sensor_dim[sensor]].reshape(number, -1)
+            left_out += expected[0, 0] > number
+            np.testing.assert_allclose(rows, expected, rtol=1e-6, atol=1e-6 * max(1.0, np.abs(expected).max()))
+        assert left_out, "no sensor had to choose"
+
+
 @pytest.mark.parametrize("substeps", [1, 3])
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 @pytest.mark.parametrize("seed", range(TREES // 4))

@@ -249,9 +249,9 @@ def test_rays_meet_height_fields_where_those_of_mujoco_do() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     rng = np.random.default_rng(5)
-    # MuJoCo's field has a box of its base inside, which rays from above never meet
-    pnt = rng.uniform((-1.5, -1.5, 1.0), (1.5, 1.5, 2.7), (400, 3))
-    vec = rng.normal((0, 0, -0.5), 1, (400, 3))
+    # above, inside and below: MuJoCo's field has a box of its base inside, whose top rays from inside meet
+    pnt = rng.uniform((-1.5, -1.5, -0.4), (1.5, 1.5, 2.7), (800, 3))
+    vec = rng.normal((0, 0, -0.5), 1, (800, 3))
     geom, normal = np.zeros(1, np.int32), np.zeros(3)
     far, found = [], []
     for origin, way in zip(pnt, vec, strict=True):

@@ -68,10 +68,14 @@ class ModelFields:
         versions = (len(self._expansions.names), self._recomputed, *(t._version for t in self._tensors.values()))
         if versions == self._versions:
             return self._values
-        shapes = geoms_of_shapes(self._model, shape_names) if "shape_mu" in self.params() else []
+        shapes = geoms_of_shapes(self._model, shape_names) if self._expansions.needs_shapes else []
         self._values = self._expansions.values(shapes, self._ids)
         self._versions = versions
         return self._values
+
+    def references(self) -> Array | None:
+        """Return ``qpos0`` of each world, ``(worlds, nq)``, if it was expanded: where a reset puts them."""
+        return self._expansions.of("qpos0") if "qpos0" in self._expansions.names else None
 
     def recompute(self) -> None:
         """Run ``mj_setConst`` for the worlds whose fields have changed since the last time."""

@@ -140,6 +140,8 @@ class Worlds:
         rows = np.asarray(ids) if not isinstance(ids, slice) else ids
         for name, start in self._start.items():
             self._arrays[name][rows] = start
+        if (references := self._fields.references()) is not None:
+            self._arrays["qpos"][rows] = references[rows]
         for name in (*_FORCES, *_KEPT, "qacc", "sensordata"):
             self._arrays[name][rows] = 0.0
         self._reset[rows] = True
@@ -224,6 +226,11 @@ class Worlds:
             finite = [np.isfinite(self._arrays[name][changed]).all(axis=1) for name in _STATE]
             self._lost[changed] = ~np.logical_and.reduce(finite)
             changed &= ~self._lost
+        forces = self._arrays["xfrc_applied"]
+        if "body_f" in self._params and not np.isfinite(forces).all():
+            # a parameter refuses what is not finite, which makes the state so in mjlab's memory
+            self._lost |= ~np.isfinite(forces).reshape(self._count, -1).all(axis=1)
+            forces = np.where(np.isfinite(forces), forces, 0.0)
         frozen = changed & self._faulted
         if frozen.any():
             self._frame = None
@@ -239,7 +246,7 @@ class Worlds:
                 self._send(sim, name, values)
             self._varied = varied
         if "body_f" in self._params:
-            self._send(sim, "body_f", self._arrays["xfrc_applied"])
+            self._send(sim, "body_f", forces)
         return sim, changed
 
     def _differs(self, name: str) -> Mask:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions
 from tightloop.mujoco.batch.library import mujoco
+from tightloop.mujoco.batch.varied_fields import AXES
 
 #: Constants that make constraints soft.
 _SOFTNESS = ("body_invweight0", "dof_invweight0", "tendon_invweight0")
-#: Kinds of joints whose limits follow ``dof_invweight0``.
-_AXES = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
 def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_sims: int) -> None:
@@ -60,6 +59,12 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
         for name, value in values.items():
             if name in expansions.names:
                 expansions.of(name)[sim] = value
+    if "tendon_length0" in expansions.names and _ties_tendons(model):
+        warnings.warn(
+            "set_const: equalities of tendons keep the tendon_length0 of the model, which qpos0 has changed; "
+            "make a Batch per value",
+            stacklevel=4,
+        )
     if any(name in expansions.names for name in _SOFTNESS) and _keeps_softness(model):
         warnings.warn(
             "set_const: equalities, dry friction, tendons and limits of balls keep the softness of the model; "
@@ -70,8 +75,13 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
         raise RuntimeError(failed)
 
 
+def _ties_tendons(model: Any) -> bool:
+    """Whether a model has equalities of tendons, which count from their lengths at ``qpos0``."""
+    return bool((np.asarray(model.eq_type) == mujoco.mjtEq.mjEQ_TENDON).any())
+
+
 def _keeps_softness(model: Any) -> bool:
     """Whether a model has constraints whose softness does not vary."""
-    balls = np.asarray(model.jnt_limited).astype(bool) & ~np.isin(model.jnt_type, _AXES)
+    balls = np.asarray(model.jnt_limited).astype(bool) & ~np.isin(model.jnt_type, AXES)
     bounded = [balls, model.tendon_limited, model.dof_frictionloss, model.tendon_frictionloss]
     return any(len(array) and bool(np.any(array)) for array in bounded) or model.neq > 0

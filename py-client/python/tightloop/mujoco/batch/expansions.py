@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop.errors import ArgumentError
-from tightloop.mujoco.batch import gains, masses
+from tightloop.mujoco.batch import gains, masses, varied_fields
 from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[Any]
@@ -28,12 +28,8 @@ _SWITCHES = {
 }
 #: Constants that `mj_setConst` computes and that act: what makes contacts and limits soft.
 _SOFTNESS = ("body_invweight0", "dof_invweight0")
-#: Columns of ``geom_friction`` as parameters: of sliding, torsion and rolling.
-_FRICTIONS = ("shape_mu", "shape_mu_torsional", "shape_mu_rolling")
-#: Largest condim of contacts that have sliding friction alone.
-_SLIDING = 3
 #: Model fields that act.
-_VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, "geom_friction", *_SOFTNESS)
+_VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, *varied_fields.FIELDS, *_SOFTNESS)
 #: What ``mj_setConst`` computes. All but `_SOFTNESS` is for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
@@ -120,16 +116,16 @@ class Expansions:
         found = [_SAME[name] for name in self._arrays if name in _SAME]
         found.extend(masses.params(self.names))
         found.extend(param for name, param in gains.PARAMS.items() if name in self._arrays)
-        if "geom_friction" in self._arrays:
-            found.extend(self._frictions)
+        for name in self._arrays:
+            if name in varied_fields.FIELDS:
+                found.extend(varied_fields.FIELDS[name].params(self._model))
         found.extend(name for name in _SOFTNESS if name in self._arrays)
         return tuple(found)
 
     @property
-    def _frictions(self) -> tuple[str, ...]:
-        """Parameters that ``geom_friction`` becomes."""
-        turns = (np.asarray(self._model.geom_condim) > _SLIDING).any()
-        return _FRICTIONS if turns else _FRICTIONS[:1]
+    def needs_shapes(self) -> bool:
+        """Whether a field of geoms is expanded."""
+        return any(name in self._arrays for name in varied_fields.GEOM_FIELDS)
 
     def values(self, shapes: list[int], ids: Array) -> dict[str, Array]:
         """Return the parameters of all simulations, ``(num_sims, columns)``, after a check of the given ones.
@@ -150,7 +146,14 @@ class Expansions:
             elif name in gains.PARAMS:
                 self._check_finite(name, ids)
                 found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
-            elif name in masses.FIELDS or name in _SOFTNESS or name == "geom_friction":
+            elif name in varied_fields.FIELDS:
+                self._check_finite(name, ids)
+                field = varied_fields.FIELDS[name]
+                wrong = field.wrong(self._model, array[ids])
+                if wrong.any():
+                    raise ArgumentError(f"sim {ids[int(wrong.argmax())]}: {name} {field.problem}")
+                found |= field.values(self._model, array, shapes)
+            elif name in masses.FIELDS or name in _SOFTNESS:
                 self._check_finite(name, ids)
         bodies = self._model.nbody
         wanted = masses.params(self.names)
@@ -160,9 +163,6 @@ class Expansions:
             found["body_inertia"] = np.broadcast_to(tensors, (self._sims, bodies, 6))
         if "body_com" in wanted:
             found["body_com"] = self._arrays["body_ipos"].astype(np.float64)
-        if "geom_friction" in self._arrays:
-            columns = self._arrays["geom_friction"][:, shapes].astype(np.float64)
-            found |= {name: columns[..., column] for column, name in enumerate(self._frictions)}
         if "body_invweight0" in self._arrays:
             # the first of both is of translation, which contacts have
             found["body_invweight0"] = self._arrays["body_invweight0"][..., 0].astype(np.float64)

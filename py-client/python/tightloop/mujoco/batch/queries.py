@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cached_property, partial
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco.batch.expansions import Expansions
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
 from tightloop.scene.scene import Scene
@@ -27,11 +29,14 @@ class Queries:
         layout: Its state.
         scene: The scene with the model alone.
         threads: Largest number of threads.
+        expansions: Fields with a value per simulation, of which ``qpos0`` places bodies.
     """
 
-    def __init__(self, model: Any, layout: StateLayout, scene: Scene, threads: int) -> None:
-        self._model, self._layout = model, layout
+    def __init__(self, model: Any, layout: StateLayout, scene: Scene, threads: int, *, expansions: Expansions) -> None:
+        self._layout, self._expansions = layout, expansions
         self._scene, self._threads = scene, threads
+        # it takes the references of the simulation whose bodies are placed
+        self._model = copy.copy(model)
         self._data = mujoco.MjData(model)
 
     @cached_property
@@ -78,25 +83,33 @@ class Queries:
             excluded[is_body] = exclude[is_body]
         origins, directions = pnt[ids], vec[ids]
         if self._rays.is_complete:
-            cast = partial(self._rays.cast, self._poses(rows), threads=self._threads)
+            cast = partial(self._rays.cast, self._poses(rows, ids), threads=self._threads)
         else:
-            cast = partial(self._by_mujoco, rows)
+            cast = partial(self._by_mujoco, rows, ids)
         found = cast(origins, directions, geomgroup=geomgroup, flg_static=bool(static), bodyexclude=excluded[None, :])
         for array, values in zip(filled, found, strict=True):
             if array is not None:
                 array[ids] = values
 
-    def _poses(self, rows: Array) -> list[Array]:
+    def _poses(self, rows: Array, ids: Array) -> list[Array]:
         """``geom_xpos`` and ``geom_xmat`` of rows."""
         geoms = self._model.ngeom
         poses = [np.empty((len(rows), geoms, 3)), np.empty((len(rows), geoms, 9))]
-        for at, row in enumerate(rows):
-            self._place(row)
+        for at, (row, sim) in enumerate(zip(rows, ids, strict=True)):
+            self._place(row, sim)
             poses[0][at], poses[1][at] = self._data.geom_xpos, self._data.geom_xmat
         return poses
 
     def _by_mujoco(
-        self, rows: Array, pnt: Array, vec: Array, *, geomgroup: Array | None, flg_static: bool, bodyexclude: Array
+        self,
+        rows: Array,
+        ids: Array,
+        pnt: Array,
+        vec: Array,
+        *,
+        geomgroup: Array | None,
+        flg_static: bool,
+        bodyexclude: Array,
     ) -> RayHits:
         """What rays meet where a geom is an SDF."""
         origins, directions = points("pnt", pnt).astype(np.float64), points("vec", vec).astype(np.float64)
@@ -105,8 +118,8 @@ class Queries:
         found = RayHits(np.empty(shape), np.empty(shape, np.int32), np.zeros((*shape, 3)))
         hit, face = np.zeros(1, np.int32), np.zeros(3)
         excluded = bodyexclude[0].tolist()
-        for at, row in enumerate(rows):
-            self._place(row)
+        for at, (row, sim) in enumerate(zip(rows, ids, strict=True)):
+            self._place(row, sim)
             for ray in range(shape[1]):
                 origin, direction, body = origins[at, ray], directions[at, ray], excluded[ray]
                 far = mujoco.mj_ray(self._model, self._data, origin, direction, geomgroup, flg_static, body, hit, face)
@@ -132,7 +145,7 @@ class Queries:
             raise ArgumentError(f"jac: body must be at least 0 and below nbody, {self._model.nbody}")
         linear, angular = (np.empty((3, self._model.nv)) for _ in range(2))
         for row, sim in zip(rows, ids, strict=True):
-            self._place(row)
+            self._place(row, sim)
             mujoco.mj_comPos(self._model, self._data)
             mujoco.mj_jac(self._model, self._data, linear, angular, point[sim].astype(np.float64), int(body[sim]))
             if jacp is not None:
@@ -140,7 +153,9 @@ class Queries:
             if jacr is not None:
                 jacr[sim] = angular
 
-    def _place(self, row: Array) -> None:
+    def _place(self, row: Array, sim: int) -> None:
+        if "qpos0" in self._expansions.names:
+            self._model.qpos0[:] = self._expansions.of("qpos0")[sim]
         self._layout.load(self._data, row)
         mujoco.mj_kinematics(self._model, self._data)
 

@@ -20,13 +20,15 @@ def geoms_of_shapes(model: Any, shape_names: list[str]) -> list[int]:
     Raises:
         ArgumentError: The names do not say which geoms they are.
     """
-    touching = np.flatnonzero((np.asarray(model.geom_contype) != 0) | (np.asarray(model.geom_conaffinity) != 0))
+    touches = (np.asarray(model.geom_contype) != 0) | (np.asarray(model.geom_conaffinity) != 0)
+    touches[[*model.pair_geom1, *model.pair_geom2]] = True
+    touching = np.flatnonzero(touches)
     bodies = [_name(model, mujoco.mjtObj.mjOBJ_BODY, int(model.geom_bodyid[geom]), "body") for geom in touching]
     geoms = [_name(model, mujoco.mjtObj.mjOBJ_GEOM, int(geom), "geom") for geom in touching]
     known = {f"{body}/{geom}": int(index) for body, geom, index in zip(bodies, geoms, touching, strict=True)}
     found = [known.get(name.partition("/")[2]) for name in shape_names]
     if len(known) != len(touching) or None in found:
-        raise ArgumentError("geom_friction: geoms and bodies need unique names without `/` to vary their friction")
+        raise ArgumentError("geoms and bodies need unique names without `/` to vary fields of geoms")
     return [geom for geom in found if geom is not None]
 
 

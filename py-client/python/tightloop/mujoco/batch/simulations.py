@@ -91,9 +91,17 @@ class Batch(NamedViews):
         options = {"threads": self.num_threads, "precision": precision, "device": device}
         self._engine = Engine(self._own, self._layout, self._bindings, options)
         self._stepping = Stepping(
-            self._own, self._fields, self._layout, self._bindings, self._engine, forward=bool(forward)
+            self._own,
+            self._fields,
+            self._layout,
+            self._bindings,
+            self._engine,
+            expansions=self._expansions,
+            forward=bool(forward),
         )
-        self._queries = Queries(self._own, self._layout, self._engine.scene, self.num_threads)
+        self._queries = Queries(
+            self._own, self._layout, self._engine.scene, self.num_threads, expansions=self._expansions
+        )
         self._lock = threading.RLock()
 
     @property
@@ -156,10 +164,12 @@ class Batch(NamedViews):
     def expand(self, name: str, dtype: DTypeLike | None = None) -> Array:
         """Return values of a field of ``MjModel`` or ``MjOption`` for each simulation, ``(num_sims, ...)``.
 
-        ``gravity``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``, ``geom_friction``, ``body_mass``,
-        ``body_inertia``, ``body_ipos``, ``actuator_gainprm``, ``actuator_biasprm``, ``body_invweight0`` and
-        ``dof_invweight0`` act from the next call on. Other fields may be read, and a step refuses values that differ
-        from the model's. Fields for pictures, and what else `set_const` computes, have no effect on the motion.
+        ``gravity``, ``qpos0``, ``jnt_range``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``,
+        ``dof_invweight0``, ``body_mass``, ``body_inertia``, ``body_ipos``, ``body_gravcomp``, ``body_invweight0``,
+        ``geom_friction``, ``geom_solref``, ``geom_solimp``, ``pair_friction``, ``actuator_gainprm``,
+        ``actuator_biasprm`` and ``actuator_forcerange`` act from the next call on. Other fields may be read, and a step
+        refuses values that differ from the model's. Fields for pictures, and what else `set_const` computes, have no
+        effect on the motion.
 
         Args:
             name: The field.
@@ -234,7 +244,7 @@ class Batch(NamedViews):
             if not -1 <= keyframe < self._own.nkey:
                 raise ArgumentError(f"keyframe {keyframe} is out of range; the model has {self._own.nkey}")
             if len(chosen):
-                self._stepping.reset(chosen, self._params(chosen), self._layout.start(keyframe))
+                self._stepping.reset(chosen, self._params(chosen), keyframe)
 
     def set_const(self, ids: ArrayLike | None = None) -> None:
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
@@ -317,7 +327,7 @@ class Batch(NamedViews):
 
     def _params(self, chosen: Selection) -> dict[str, Array]:
         shapes: list[int] = []
-        if "geom_friction" in self._expansions.names:
+        if self._expansions.needs_shapes:
             shapes = geoms_of_shapes(self._own, self._engine.sim.shape_names)
         return self._expansions.values(shapes, chosen.indices)
 

@@ -17,6 +17,7 @@ from tightloop.arrays.frames import FAULTED
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.engine import Engine
+from tightloop.mujoco.batch.expansions import Expansions
 from tightloop.mujoco.batch.fields import Fields
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
@@ -46,11 +47,19 @@ class Stepping:
     """
 
     def __init__(
-        self, model: Any, fields: Fields, layout: StateLayout, bindings: Bindings, engine: Engine, *, forward: bool
+        self,
+        model: Any,
+        fields: Fields,
+        layout: StateLayout,
+        bindings: Bindings,
+        engine: Engine,
+        *,
+        expansions: Expansions,
+        forward: bool,
     ) -> None:
+        self._expansions = expansions
         self._model, self._fields, self._layout = model, fields, layout
         self._bindings, self._engine, self._forward = bindings, engine, forward
-        self._start = layout.start(-1)
         self._names: list[str] = []
         # whether fields follow what worlds hold beside positions and velocities: controls and forces, or mocap bodies
         self._depends = bool(model.nmocap)
@@ -109,8 +118,9 @@ class Stepping:
         self._evaluate(chosen)
         self._bindings.settle(chosen.ids)
 
-    def reset(self, chosen: Selection, params: dict[str, Array], start: Array) -> None:
-        """Reset simulations to a row; see `Batch.reset`."""
+    def reset(self, chosen: Selection, params: dict[str, Array], keyframe: int) -> None:
+        """Reset simulations; see `Batch.reset`."""
+        start = self._starts(chosen.indices, keyframe)
         bindings, ids = self._bindings, chosen.ids
         bindings.collect(ids)
         rows, last = bindings.rows[ids], bindings.last[ids]
@@ -163,9 +173,18 @@ class Stepping:
             self._engine.silenced[sims] = True
             self._bindings.warnings[sims, int(_WARN.mjWARN_BADCTRL), 1] += times
 
+    def _starts(self, sims: Array, keyframe: int = -1) -> Array:
+        """Return rows after a reset, ``(size,)`` or ``(n, size)``; the start has the ``qpos0`` of each."""
+        row = self._layout.start(keyframe)
+        if keyframe >= 0 or "qpos0" not in self._expansions.names:
+            return row
+        rows = np.tile(row, (len(sims), 1))
+        rows[:, self._layout.at("qpos")] = self._expansions.of("qpos0")[sims]
+        return rows
+
     def _restart(self, sims: Array, warning: int) -> None:
         """Reset simulations that are unstable, as MuJoCo does, and count the warning."""
-        self._bindings.rows[sims] = self._start
+        self._bindings.rows[sims] = self._starts(sims)
         self._bindings.warnings[sims] = 0
         self._bindings.warnings[sims, warning, 1] += 1
         self._engine.mark_stale(sims)

@@ -67,6 +67,10 @@ impl ContactBuilder<'_> {
         let clipped = self.pieces.iter().filter(is_clipped).count();
         let mut kinds = self.pieces.iter().map(|piece| piece.solid.kind);
         let has_fields = kinds.any(|kind| kind == Kind::Field);
+        let named_pairs = match contacts.varying.pairs {
+            true => self.rules.pairs().count(),
+            false => 0,
+        };
         let mut len = 0;
         // bases and strides of four: a GPU then reads and writes four numbers at a time
         let mut table = |stride: usize, rows: usize| {
@@ -85,7 +89,7 @@ impl ContactBuilder<'_> {
             counts: table(1, contacts.classes.len() + COUNTS),
             rows: table(row_len, rows),
             mu: match contacts.varying.any() {
-                true => table(contacts.varying.columns(), self.pieces.len()),
+                true => table(contacts.varying.columns(), self.pieces.len() + named_pairs),
                 false => contacts.memory.mu,
             },
             cut: match contacts.hulls.spans.rows + clipped {

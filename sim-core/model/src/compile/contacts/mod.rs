@@ -6,6 +6,7 @@ mod memory;
 mod pairs;
 pub(super) mod pieces;
 pub(super) mod sensors;
+mod varying;
 
 use crate::description::Description;
 use crate::error::ModelError;
@@ -49,10 +50,13 @@ pub(super) fn add_contacts(
         return Ok(());
     }
     let varies = |param| scene.params.contains(&param);
+    let pairs_vary = varies(Param::PairFriction) && rules.pairs().next().is_some();
     contacts.varying = VaryingSurfaces {
-        mu: varies(Param::ShapeMu),
-        turning: varies(Param::ShapeMuTorsional) || varies(Param::ShapeMuRolling),
+        mu: varies(Param::ShapeMu) || pairs_vary,
+        turning: varies(Param::ShapeMuTorsional) || varies(Param::ShapeMuRolling) || pairs_vary,
         weight: varies(Param::BodyInvweight0),
+        softness: varies(Param::ShapeSolref) || varies(Param::ShapeSolimp),
+        pairs: pairs_vary,
     };
     let builder = ContactBuilder {
         constants,
@@ -155,6 +159,8 @@ impl ContactBuilder<'_> {
             contacts.tables.numbers.extend(ratios.as_flattened());
         }
         self.add_combine(contacts, pairs);
+        self.add_mixing(contacts, pairs);
+        self.add_named_pairs(contacts, pairs);
         contacts.two_point_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
         contacts.are_stiff = self.are_stiff(pairs, &mu);
         let coupled = self.coupled(contacts);
@@ -192,7 +198,12 @@ impl ContactBuilder<'_> {
     /// Whether some contact may be [`STIFFNESS_MAX`] times as stiff as its bodies are heavy; `mu` are the coefficients of friction.
     fn are_stiff(&self, pairs: &[(usize, usize)], mu: &[f64]) -> bool {
         let impratio = self.scene.solver.impratio;
-        let varies = self.scene.params.contains(&Param::ShapeMu);
+        let varies = |param| self.scene.params.contains(&param);
+        // an impedance that varies may come near 1
+        if varies(Param::ShapeSolimp) {
+            return true;
+        }
+        let varies = varies(Param::ShapeMu) || varies(Param::PairFriction);
         pairs.iter().zip(mu).any(|(&pair, &mu)| {
             let impedance = self.impedance(pair);
             let d = impedance.d_min.max(impedance.d_max);
@@ -276,7 +287,7 @@ impl ContactBuilder<'_> {
     }
 
     /// Whose friction counts for a pair: MuJoCo's rule for its geoms, that of the scene for others.
-    fn friction_rule(&self, (a, b): (usize, usize)) -> f64 {
+    pub(super) fn friction_rule(&self, (a, b): (usize, usize)) -> f64 {
         let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
         if self.geom_pair(a, b).is_none() {
             return rule::COMBINED;

@@ -107,12 +107,7 @@ impl ContactBuilder<'_> {
             row[pair::LEVERS + c] = lever;
         }
         if let Some(geom) = geom {
-            let is_safe = self
-                .rules
-                .precompiled
-                .iter()
-                .flatten()
-                .all(|m| m.safe_references);
+            let is_safe = self.has_safe_references();
             let (stiffness, damping) = geom.softness.reference(self.scene.dt, is_safe);
             row[pair::STIFFNESS] = stiffness;
             row[pair::DAMPING] = damping;
@@ -138,6 +133,12 @@ impl ContactBuilder<'_> {
             self.scene.solver.impratio,
             self.scene.dt,
         );
+    }
+
+    /// Whether time constants of MuJoCo's geoms are at least two steps.
+    pub(super) fn has_safe_references(&self) -> bool {
+        let mut models = self.rules.precompiled.iter().flatten();
+        models.all(|parts| parts.safe_references)
     }
 
     /// What the contact of two shapes is like where one of them is a geom of MuJoCo's.

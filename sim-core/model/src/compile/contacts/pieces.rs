@@ -9,6 +9,7 @@ use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
 use crate::joint_kind::JointKind;
 use crate::pose::Pose;
+use crate::softness::Softness;
 use crate::surface::Surface;
 use crate::value_checks::within;
 use sim_physics::constants::Constants;
@@ -50,10 +51,15 @@ impl PlacedShape<'_> {
         self.geom.map_or(0, |geom| geom.priority)
     }
 
-    /// Torsional and rolling friction [m]; a shape that is no geom of MuJoCo's has none.
+    /// Torsional and rolling friction [m], which counts in contacts with geoms of MuJoCo's.
     pub fn turning_mu(&self) -> [f64; 2] {
-        self.geom
-            .map_or([0.0; 2], |geom| [geom.friction[1], geom.friction[2]])
+        let [_, twist, roll] = geom_of(self).friction;
+        [twist, roll]
+    }
+
+    /// MuJoCo's `solref` and `solimp`.
+    pub fn softness(&self) -> Softness {
+        geom_of(self).softness
     }
 }
 
@@ -70,6 +76,12 @@ pub(in crate::compile) struct Rules<'a> {
 }
 
 impl<'a> Rules<'a> {
+    /// Pairs of geoms that models name.
+    pub fn pairs(&self) -> impl Iterator<Item = &'a ContactPair> + use<'a, '_> {
+        let precompiled = self.precompiled.iter().flatten();
+        precompiled.flat_map(|parts| &parts.pairs)
+    }
+
     pub fn new(
         scene: &'a Description,
         carriers: &[Vec<Carrier>],
@@ -312,6 +324,10 @@ fn piece(
             shape: b.number,
             link: b.link,
             friction: [b.surface.mu, b.turning_mu()[0], b.turning_mu()[1]],
+            softness: std::array::from_fn(|k| match k.checked_sub(2) {
+                None => b.softness().solref[k],
+                Some(k) => b.softness().solimp[k],
+            }),
             body: b.body,
             axes,
             is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -387,10 +403,21 @@ pub(super) fn named_pair<'a>(
     b: &PlacedShape<'_>,
     rules: &Rules<'a>,
 ) -> Option<&'a ContactPair> {
-    let parts = rules.precompiled[a.robot.filter(|_| a.robot == b.robot)?]?;
+    rules.pairs().nth(named_pair_place(a, b, rules)?)
+}
+
+/// Place of two geoms among the pairs that models name.
+pub(super) fn named_pair_place(
+    a: &PlacedShape<'_>,
+    b: &PlacedShape<'_>,
+    rules: &Rules<'_>,
+) -> Option<usize> {
+    let robot = a.robot.filter(|_| a.robot == b.robot)?;
     let geoms = [a, b].map(|shape| (shape.own_link, shape.place));
-    let mut pairs = parts.pairs.iter();
-    pairs.find(|pair| pair.geoms == geoms || pair.geoms == [geoms[1], geoms[0]])
+    let mut pairs = rules.precompiled[robot]?.pairs.iter();
+    let place = pairs.position(|pair| pair.geoms == geoms || pair.geoms == [geoms[1], geoms[0]])?;
+    let before = rules.precompiled[..robot].iter().flatten();
+    Some(before.map(|parts| parts.pairs.len()).sum::<usize>() + place)
 }
 
 fn may_touch(a: &PlacedShape<'_>, b: &PlacedShape<'_>, rules: &Rules<'_>) -> bool {

@@ -1,12 +1,12 @@
 //! Which bodies of MuJoCo models contacts act on, and which sensors they are of.
 
-use super::pieces::PlacedShape;
+use super::pieces::{PlacedShape, Rules, named_pair_place};
 use crate::description::{Description, Precompiled, Sense, Shape, Touching};
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::{Contacts, Kind, TouchedBodies};
-use sim_physics::constants::sensors::SensorKind;
+use sim_physics::constants::contact::{Contacts, Kind, Pair, TouchedBodies};
+use sim_physics::constants::sensors::{Reduction, Sensor, SensorKind};
 use sim_physics::lane::Fixed;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Gives each class of contacts the bodies of MuJoCo models that it acts on, and each pair their places in that list.
 pub(super) fn add_touched_bodies(constants: &mut Constants<f64>) {
@@ -63,6 +63,7 @@ pub(in crate::compile) fn add_contact_sensors(
     constants: &mut Constants<f64>,
     scene: &Description,
     shapes: &[PlacedShape<'_>],
+    rules: &Rules<'_>,
 ) {
     let sides = sides(scene, shapes);
     let pairs = &constants.contacts.pairs;
@@ -147,6 +148,41 @@ pub(in crate::compile) fn add_contact_sensors(
     constants.contacts.tables.numbers.extend(numbers);
     constants.sensors.pairs = table;
     constants.sensors.records = records;
+    let takes_first = |sensor: &Sensor<f64>| match &sensor.kind {
+        SensorKind::Contact(contact) => contact.reduction == Reduction::First,
+        _ => false,
+    };
+    if constants.sensors.all.iter().any(takes_first) {
+        let ranks = ranks(&constants.contacts.pairs, &sides, shapes, rules);
+        constants.sensors.ranks = Fixed {
+            base: constants.contacts.tables.numbers.len(),
+            stride: 1,
+            rows: ranks.len(),
+        };
+        constants.contacts.tables.numbers.extend(ranks);
+    }
+}
+
+/// Place of each pair in MuJoCo's order of contacts (`mj_collision`): by the two bodies, then pairs that a model names, then by
+/// the two geoms in their order in a contact.
+fn ranks(
+    pairs: &[Pair],
+    sides: &[Side],
+    shapes: &[PlacedShape<'_>],
+    rules: &Rules<'_>,
+) -> Vec<f64> {
+    let key = |pair: &Pair| {
+        let mut numbers = pair.shapes;
+        numbers.sort_by_key(|&shape| sides[shape].rank);
+        let [first, second] = numbers.map(|number| &shapes[number]);
+        let mut bodies = [first, second].map(|shape| (shape.robot, shape.own_link));
+        bodies.sort_unstable();
+        let named = named_pair_place(first, second, rules);
+        (bodies, named.unwrap_or(usize::MAX), numbers)
+    };
+    let keys: BTreeSet<_> = pairs.iter().map(key).collect();
+    let places: BTreeMap<_, usize> = keys.into_iter().zip(0..).collect();
+    pairs.iter().map(|pair| places[&key(pair)] as f64).collect()
 }
 
 /// Pairs of a plane and a capsule that a sensor is of, each with the capsule among the solids.

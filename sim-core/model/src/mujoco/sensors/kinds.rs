@@ -126,6 +126,7 @@ impl Reader<'_> {
                 let world = OnLink {
                     link: 0,
                     pose: Pose::identity(),
+                    is_inertial: false,
                 };
                 return Ok(Ok(Sense::Vector(world, vector)));
             }

@@ -17,19 +17,23 @@ impl Reader<'_> {
             let frame = usize::try_from(id).ok().and_then(|id| frames.get(id));
             frame.copied().ok_or_else(|| self.fault(k))
         };
-        let body = |pose: fn(&Reader<'_>, usize) -> Pose| {
+        let body = |is_inertial: bool| {
             let link = usize::try_from(id)
                 .ok()
                 .filter(|&id| id < self.bodies.len());
             let link = link.ok_or_else(|| self.fault(k))?;
             Ok::<OnLink, ModelError>(OnLink {
                 link,
-                pose: pose(self, link),
+                pose: match is_inertial {
+                    true => self.bodies[link],
+                    false => Pose::identity(),
+                },
+                is_inertial,
             })
         };
         Ok(Ok(match self.objects[which][k].as_str() {
-            "mjOBJ_BODY" => body(|reader, link| reader.bodies[link])?,
-            "mjOBJ_XBODY" => body(|_, _| Pose::identity())?,
+            "mjOBJ_BODY" => body(true)?,
+            "mjOBJ_XBODY" => body(false)?,
             "mjOBJ_GEOM" => place(&self.geoms)?,
             "mjOBJ_SITE" => place(&self.sites)?,
             "mjOBJ_CAMERA" => {

@@ -22,19 +22,16 @@ mod height_field;
 mod manifold;
 mod narrow;
 mod primitive;
+mod surfaces;
 mod variables;
 
-use super::params::param;
 use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
-use crate::constants::contact::Cone;
 use crate::constants::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, MU_MIN, Solid, WEIGHT_MIN, pair,
-    rule, surface,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Cone, Contacts, Kind, pair, surface,
 };
 use crate::constants::pair_groups::BLOCK;
-use crate::constants::params::Param;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
@@ -42,6 +39,7 @@ pub(super) use height_field::field_samples::Samples;
 pub use height_field::fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
 use manifold::points::{Points, Room};
 pub use narrow::*;
+use surfaces::{friction, place_pairs, place_surface, softness, varying};
 
 /// Poses of shapes.
 pub struct Place;
@@ -92,6 +90,9 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
             place_surface(cx, m, &b.params, solid, row);
         }
     }
+    if m.contacts.varying.pairs {
+        place_pairs(cx, m, &b.params);
+    }
     // origins: the reference point of each tree
     for (t, reference) in w.reference.iter().enumerate() {
         let row = cx.at(t);
@@ -100,32 +101,6 @@ fn place_shapes<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>) {
     // static shapes are relative to the origin of the world, the last row
     let world = cx.at(w.reference.len());
     cx.fill_all(memory.origins, world, 0, [C::F::c(0.0); 3]);
-}
-
-/// Writes what differs per world of a shape's surface and body.
-#[inline(always)]
-fn place_surface<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    params: &[C::F],
-    solid: &Solid<<C::F as Num>::Real>,
-    row: C::I,
-) {
-    let (table, varying) = (m.contacts.memory.mu, m.contacts.varying);
-    let columns = [
-        (varying.mu, Param::ShapeMu, surface::MU),
-        (varying.turning, Param::ShapeMuTorsional, surface::TORSION),
-        (varying.turning, Param::ShapeMuRolling, surface::ROLLING),
-    ];
-    for (_, which, column) in columns.into_iter().filter(|(varies, ..)| *varies) {
-        let mu = param(m, params, which, solid.shape, solid.friction[column]);
-        cx.fill(table, row, column, mu);
-    }
-    if let (true, Some(first)) = (varying.weight, m.varying.first(Param::BodyInvweight0)) {
-        // what stands still has no inverse weight
-        let weight = solid.link.map_or(C::F::c(0.0), |link| params[first + link]);
-        cx.fill(table, row, surface::WEIGHT, weight);
-    }
 }
 
 /// Adds the contacts of all pairs of two kinds.
@@ -370,68 +345,6 @@ fn boxes_overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
-/// A column of the surfaces of a pair's two shapes.
-#[inline(always)]
-fn surfaces<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    p: C::I,
-    column: usize,
-) -> (C::F, C::F) {
-    let (indices, table) = (t.handles.pair_indices, t.memory.mu);
-    let a = cx.index(indices, p, pair::SOLID_A, table.rows);
-    let b = cx.index(indices, p, pair::SOLID_B, table.rows);
-    (cx.load(table, a, column), cx.load(table, b, column))
-}
-
-/// Coefficient of friction of a pair where those of shapes vary: of sliding, torsion or rolling, by its column.
-#[inline(always)]
-fn friction<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, p: C::I, column: usize) -> C::F {
-    let (a, b) = surfaces(cx, t, p, column);
-    let mut mu = t.combine.coefficient(a, b);
-    // some pairs have the larger coefficient, however the others combine theirs, or that of one shape, or their own
-    if t.keeps_max.rows > 0 {
-        let rule = cx.constant(t.keeps_max, p, 0);
-        // rules are whole: a half keeps the comparison clear of rounding
-        let is_at_least = |least: f64| C::F::c(least - 0.5).lt(rule);
-        mu = C::F::select(is_at_least(rule::LARGER), a.max(b), mu);
-        if t.has_rules {
-            mu = C::F::select(is_at_least(rule::FIRST), a, mu);
-            mu = C::F::select(is_at_least(rule::SECOND), b, mu);
-            let mut of_pair = cx.constant(t.handles.pair_numbers, p, pair::MU);
-            if column != surface::MU && t.turning.rows > 0 {
-                of_pair = of_pair * cx.constant(t.turning, p, column - surface::TORSION);
-            }
-            mu = C::F::select(is_at_least(rule::OWN), of_pair, mu);
-        }
-    }
-    mu.max(C::F::c(MU_MIN))
-}
-
-/// Torsional and rolling friction over that of sliding, and the inverse weight of both bodies, where one of them varies.
-#[inline(always)]
-fn varying<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    p: C::I,
-    mu: Option<C::F>,
-) -> Option<[C::F; 3]> {
-    if !t.varying.turning && !t.varying.weight {
-        return None;
-    }
-    let mut scalars = [C::F::c(0.0); 3];
-    if t.varying.turning {
-        let mu = mu.unwrap_or(cx.constant(t.handles.pair_numbers, p, pair::MU));
-        scalars[0] = friction(cx, t, p, surface::TORSION).div(mu);
-        scalars[1] = friction(cx, t, p, surface::ROLLING).div(mu);
-    }
-    if t.varying.weight {
-        let (a, b) = surfaces(cx, t, p, surface::WEIGHT);
-        scalars[2] = (a + b).max(C::F::c(WEIGHT_MIN));
-    }
-    Some(scalars)
-}
-
 /// The list of a pair's contacts. Its rows count from the reference point of the pair's class.
 #[inline(always)]
 fn points_of<C: Cx>(
@@ -460,6 +373,7 @@ fn points_of<C: Cx>(
         flip: cx.constant(scalars, p, pair::FLIP),
         mu,
         varying: varying(cx, t, p, mu),
+        softness: softness(cx, t, p),
         // the forces of a pyramidal cone depend on the tangents' direction
         along: (t.cone == Cone::Pyramidal).then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {

@@ -8,11 +8,10 @@
 //! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
 //! ```
 
-use super::joint_rows::impedance;
+use super::joint_rows::{impedance, impedance_between};
 use crate::arrays::Array as A;
-use crate::constants::Constants;
-use crate::constants::contact::Cone;
-use crate::constants::contact::{COUNT_LEFT_OUT, Class, Contacts, pair, row, turning};
+use crate::constants::contact::{COUNT_LEFT_OUT, Class, Cone, Contacts, pair, row, soft, turning};
+use crate::constants::{Constants, Impedance};
 use crate::each;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::Spatial;
@@ -117,6 +116,18 @@ impl<'a, C: Cx> Contact<'a, C> {
         shared(cx, self.t, self.class, self.pair, k)
     }
 
+    /// Reference stiffness or damping: a scalar of the contact's pair, or of the contact where it varies.
+    #[inline(always)]
+    fn softness(&self, cx: &mut C, k: usize) -> C::F {
+        match self.t.varying.softness {
+            false => self.of_pair(cx, k),
+            true => {
+                let place = row::SOFTNESS + k - pair::STIFFNESS;
+                cx.load(self.t.memory.rows, self.row, place)
+            }
+        }
+    }
+
     /// Writes J and the tangents, and returns J q̇.
     #[inline(always)]
     fn write_jacobian(&self, cx: &mut C, b: &BlockOf<C>) -> [C::F; 3] {
@@ -160,15 +171,17 @@ impl<'a, C: Cx> Contact<'a, C> {
     fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
         let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
         // friction of torsion and of rolling over that of sliding
-        let [twist, roll] = [0, 1].map(|k| {
+        let mut ratios = [zero; 2];
+        for (k, scaled) in ratios.iter_mut().enumerate() {
             let mut ratio = cx.pick(t.turning, self.pair, k);
             // where it varies, a ratio above 0 only says that the pair has this friction
             if t.varying.turning {
                 let varied = cx.load(t.memory.rows, self.row, row::VARYING + k);
                 ratio = C::F::select(zero.lt(ratio), varied, zero);
             }
-            ratio * self.rubs
-        });
+            *scaled = ratio * self.rubs;
+        }
+        let [twist, roll] = ratios;
         let scales = [twist, roll, roll];
         let mut velocity = [zero; 3];
         // J(i, dof) = ± scale (axis · ω)
@@ -190,8 +203,8 @@ impl<'a, C: Cx> Contact<'a, C> {
         }
         // the edges of a pyramid have the damping of the normal row
         let damping = match t.cone {
-            Cone::Elliptic => self.of_pair(cx, pair::SLIDING),
-            Cone::Pyramidal => self.of_pair(cx, pair::DAMPING),
+            Cone::Elliptic => self.softness(cx, pair::SLIDING),
+            Cone::Pyramidal => self.softness(cx, pair::DAMPING),
         };
         // no force past the margin, as in `write_softness`
         let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
@@ -209,25 +222,38 @@ impl<'a, C: Cx> Contact<'a, C> {
         cx.fill_all(t.memory.rows, self.row, block + turning::EXISTS, exists);
     }
 
+    /// `d_min`, `d_max`, 1 / width and midpoint of the contact, where they vary.
+    #[inline(always)]
+    fn varied_impedance(&self, cx: &mut C) -> Option<[C::F; 4]> {
+        if !self.t.varying.softness {
+            return None;
+        }
+        let (rows, first) = (self.t.memory.rows, row::SOFTNESS + soft::IMPEDANCE);
+        let mut varied = [C::F::c(0.0); 4];
+        for (k, x) in varied.iter_mut().enumerate() {
+            *x = cx.load(rows, self.row, first + k);
+        }
+        Some(varied)
+    }
+
     /// d(r) of the contact's pair.
     #[inline(always)]
     fn impedance(&self, cx: &mut C, m: &ConstantsOf<C>, position: C::F) -> C::F {
+        let varied = self.varied_impedance(cx);
         // all pairs have the same impedance, or the class lists those of its pairs
         let Some(kinds) = m.contacts.impedances.of_classes.get(self.number) else {
-            return impedance(&m.contact_impedance, position);
+            return impedance_of_kind(&m.contact_impedance, varied, position);
         };
         // kind after kind, each selected where it is that of the pair
-        let mut d = impedance(&m.contacts.impedances.all[kinds[0]], position);
+        let all = &m.contacts.impedances.all;
+        let mut d = impedance_of_kind(&all[kinds[0]], varied, position);
         if let [_, others @ ..] = &kinds[..] {
             let kind_of_pair = cx.pick(m.contacts.impedances.of_pair, self.pair, 0);
             for &kind in others {
                 // places are whole, so within a half they are equal
                 let is_it = (kind_of_pair - C::F::c(kind as f64)).abs().lt(C::F::c(0.5));
-                d = C::F::select(
-                    is_it,
-                    impedance(&m.contacts.impedances.all[kind], position),
-                    d,
-                );
+                let of_kind = impedance_of_kind(&all[kind], varied, position);
+                d = C::F::select(is_it, of_kind, d);
             }
         }
         d
@@ -260,12 +286,12 @@ impl<'a, C: Cx> Contact<'a, C> {
             true => cx.load(t.memory.rows, r, row::VARYING + 2),
         };
         let stiff = d.div((one - d) * weight);
-        let damping = self.of_pair(cx, pair::DAMPING);
-        let spring = self.of_pair(cx, pair::STIFFNESS) * d * position;
+        let damping = self.softness(cx, pair::DAMPING);
+        let spring = self.softness(cx, pair::STIFFNESS) * d * position;
         let mut aref = [-velocity[0].fma(damping, spring), zero, zero];
         // a pyramid has the D of its edges, and tangents are damped as its normal
         let (stiff, sliding) = match t.cone {
-            Cone::Elliptic => (stiff, self.of_pair(cx, pair::SLIDING)),
+            Cone::Elliptic => (stiff, self.softness(cx, pair::SLIDING)),
             Cone::Pyramidal => (stiff * edge_stiffness(t.impratio, mu), damping),
         };
         // a tangent has no position: aref = -b' v
@@ -292,6 +318,15 @@ impl<'a, C: Cx> Contact<'a, C> {
             *x = C::F::select(pushes, *x, zero);
         }
         cx.fill_all(t.memory.rows, r, row::AREF, aref);
+    }
+}
+
+/// d(r) of a kind of contacts, of which the power alone counts where the rest varies.
+#[inline(always)]
+fn impedance_of_kind<F: Num>(kind: &Impedance<F::Real>, varied: Option<[F; 4]>, position: F) -> F {
+    match varied {
+        None => impedance(kind, position),
+        Some(varied) => impedance_between(varied, kind.power.to_f64(), position),
     }
 }
 

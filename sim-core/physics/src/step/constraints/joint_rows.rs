@@ -9,10 +9,10 @@
 //! is compiled. Only the side of a limit is found at run time.
 
 use crate::arrays::Array as A;
+use crate::constants::contact::WEIGHT_MIN;
 use crate::constants::params::Param;
-use crate::constants::{Impedance, Soft};
+use crate::constants::{Constants, FAR, Impedance, Limit, Soft};
 use crate::lane::{Cx, Num, Real};
-use crate::step::params::param;
 use crate::step::{BlockOf, ConstantsOf, Stage};
 use crate::when;
 
@@ -61,7 +61,8 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let mut nearest = zero;
     for (n, limit) in m.limits.iter().enumerate() {
         let q = cx.get(&b.joint_q[m.dofs[limit.dof].coord]);
-        let (above, below) = (q - C::F::k(limit.lower), C::F::k(limit.upper) - q);
+        let [lower, upper] = range(m, &b.params, limit);
+        let (above, below) = (q - lower, upper - q);
         w.limit_side[n] = C::F::select(above.lt(below), one, -one);
         distance[n] = above.min(below);
         nearest = nearest.min(distance[n]);
@@ -73,8 +74,10 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for (n, limit) in m.limits.iter().enumerate() {
             // side × q̇ is the rate of r
             let velocity = w.limit_side[n] * cx.get(&b.joint_qd[limit.dof]);
-            let fixed = limit.soft.inverse_weight;
-            let inverse_weight = param(m, &b.params, Param::DofInvweight0, limit.dof, fixed);
+            let inverse_weight = match m.varying.first(Param::DofInvweight0) {
+                Some(first) => b.params[first + limit.dof].max(C::F::c(WEIGHT_MIN)),
+                None => C::F::k(limit.soft.inverse_weight),
+            };
             let (weight, aref) = soft_row(&limit.soft, inverse_weight, distance[n], velocity);
             // other worlds of the block may be inside their range
             let active = distance[n].lt(zero);
@@ -85,6 +88,30 @@ fn rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
             cx.set(&mut b.efc_aref[row + n], C::F::select(active, aref, zero));
         }
     });
+}
+
+/// Ends of a range, margin included, of each world where they vary.
+#[inline(always)]
+pub(in crate::step) fn range<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    limit: &Limit<F::Real>,
+) -> [F; 2] {
+    let mut ends = [F::k(limit.lower), F::k(limit.upper)];
+    let (margin, which) = (
+        F::k(limit.margin),
+        [Param::JointLimitLower, Param::JointLimitUpper],
+    );
+    // a row of one side alone keeps its other end out of reach, which `f32` rounds
+    let has_lower = limit.lower.to_f64().abs() < 0.5 * FAR;
+    let has_upper = limit.upper.to_f64().abs() < 0.5 * FAR;
+    if let (Some(first), true) = (m.varying.first(which[0]), has_lower) {
+        ends[0] = params[first + limit.dof] + margin;
+    }
+    if let (Some(first), true) = (m.varying.first(which[1]), has_upper) {
+        ends[1] = params[first + limit.dof] - margin;
+    }
+    ends
 }
 
 /// x ≥ 0 to a power of at least 1. The digits of a power that is no whole number become roots.
@@ -142,4 +169,21 @@ pub(in crate::step) fn impedance<F: Num>(i: &Impedance<F::Real>, position: F) ->
     // d = d_min + y (d_max - d_min)
     let y = F::select(x.lt(F::k(i.midpoint)), rising, falling);
     y.fma(F::k(i.d_max) - F::k(i.d_min), F::k(i.d_min))
+}
+
+/// As [`impedance`], between `d_min` and `d_max` with 1 / width and midpoint of each world.
+#[inline(always)]
+pub(in crate::step) fn impedance_between<F: Num>(
+    [d_min, d_max, inverse_width, midpoint]: [F; 4],
+    power: f64,
+    position: F,
+) -> F {
+    let one = F::c(1.0);
+    let x = (position.abs() * inverse_width).min(one);
+    // m (x/m)^p up to the midpoint m, 1 - (1 - m) ((1 - x)/(1 - m))^p above
+    let beyond = one - midpoint;
+    let rising = midpoint * powered(x.div(midpoint), power);
+    let falling = beyond * powered((one - x).div(beyond), power);
+    let y = F::select(x.lt(midpoint), rising, one - falling);
+    y.fma(d_max - d_min, d_min)
 }

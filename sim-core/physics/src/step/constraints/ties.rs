@@ -12,12 +12,14 @@ use super::joint_rows::impedance;
 use super::tied_frames::of_frames;
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
+use crate::constants::params::Param;
 use crate::constants::springs::Term;
 use crate::constants::ties::{Lengths, Measure, Tie, TieLaw};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
 use crate::math::spatial::ANGULAR;
 use crate::math::vec3::Vec3;
+use crate::step::params::moved_by;
 use crate::step::tree::bias::accelerations_at_rest;
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage};
@@ -38,6 +40,7 @@ impl Stage for Ties {
         A::JointQ,
         A::JointQd,
         A::EqActive,
+        A::Params,
         A::Rotation,
         A::Origin,
         A::Reference,
@@ -146,6 +149,20 @@ pub(in crate::step) fn length<C: Cx>(
     length
 }
 
+/// o₁ and o₂, of each world where the references of joints vary.
+#[inline(always)]
+fn offsets<F: Num>(m: &Constants<F::Real>, params: &[F], lengths: &Lengths<F::Real>) -> [F; 2] {
+    let mut offsets = lengths.offsets.map(F::k);
+    for (offset, dof) in offsets.iter_mut().zip(lengths.referred) {
+        if let Some(dof) = dof
+            && let Some(moved) = moved_by(m, params, Param::JointRef, dof)
+        {
+            *offset = *offset + moved;
+        }
+    }
+    offsets
+}
+
 #[inline(always)]
 fn of_lengths<C: Cx>(
     cx: &mut C,
@@ -154,7 +171,7 @@ fn of_lengths<C: Cx>(
     tie: &Tie<<C::F as Num>::Real>,
     lengths: &Lengths<<C::F as Num>::Real>,
 ) -> C::F {
-    let [first, second] = lengths.offsets.map(C::F::k);
+    let [first, second] = offsets(m, &b.params, lengths);
     // l₁ - o₁ and l₂ - o₂
     let first_change = length(cx, m, b, &lengths.first) - first;
     let second_change = length(cx, m, b, &lengths.second) - second;

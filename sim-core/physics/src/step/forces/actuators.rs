@@ -77,7 +77,10 @@ impl Stage for Actuators {
             if bounds.any(|bound| bound.actuators.contains(&k)) {
                 force = force * b.work.actuator_force[k];
             }
-            let force = bounded(force, actuator.force_range);
+            let force = match force_range(m, &b.params, k) {
+                Some([least, most]) => force.max(least).min(most),
+                None => force,
+            };
             b.work.actuator_force[k] = force;
             // Σ c force, where the moments c are constant
             for term in &actuator.terms {
@@ -246,6 +249,17 @@ fn law<F: Num>(
     sum
 }
 
+/// Bounds of the force of actuator `k`, if it has any.
+#[inline(always)]
+fn force_range<F: Num>(m: &Constants<F::Real>, params: &[F], k: usize) -> Option<[F; 2]> {
+    let [least, most] = m.actuators.all[k].force_range?;
+    let which = Param::ActuatorForcerange;
+    Some([
+        param(m, params, which, 2 * k, least),
+        param(m, params, which, 2 * k + 1, most),
+    ])
+}
+
 #[inline(always)]
 fn bounded<F: Num>(x: F, range: Option<[F::Real; 2]>) -> F {
     match range {
@@ -270,9 +284,9 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         let slope = gain.fma(input, velocity_factor(Param::ActuatorBias, actuator.bias));
         let mut damping = -(slope * dt);
         // a force at its bound does not change with the velocity: no damping in that world
-        if let Some([least, most]) = actuator.force_range {
+        if let Some([least, most]) = force_range(m, &b.params, k) {
             let force = b.work.actuator_force[k];
-            let within: MaskOf<C> = C::F::k(least).lt(force) & force.lt(C::F::k(most));
+            let within: MaskOf<C> = least.lt(force) & force.lt(most);
             damping = C::F::select(within, damping, C::F::c(0.0));
         }
         // M += Jᵀ (-h ∂force/∂v) J

@@ -9,9 +9,10 @@
 use super::link_forces;
 use crate::arrays::Array as A;
 use crate::constants::Constants;
-use crate::lane::{Cx, Num, Real};
+use crate::constants::params::Param;
+use crate::lane::{Cx, Real};
 use crate::math::vec3::Vec3;
-use crate::step::{BlockOf, ConstantsOf, Stage, gravity, masses};
+use crate::step::{BlockOf, ConstantsOf, Stage, gravity, masses, param};
 
 /// Forces that hold links against gravity.
 pub struct GravityCompensation;
@@ -50,7 +51,8 @@ pub(in crate::step) fn forces<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let center = masses::center_of_frame(m, params, held.link, held.center);
         let point = w.rotation[held.body].mul_add(center, w.origin[held.body]);
         let mass = masses::mass(m, params, held.link, held.mass);
-        let force = up * (mass * C::F::k(held.share));
+        let share = param(m, params, Param::BodyGravcomp, held.link, held.share);
+        let force = up * (mass * share);
         link_forces::add(w, held.body, point, force, Vec3::zero());
     }
     // Σ Jᵀ f

@@ -8,7 +8,7 @@ use crate::constants::Motion;
 use crate::lane::{Cx, Num};
 use crate::math::quat::{self, mul, turn_z};
 use crate::math::vec3::Vec3;
-use crate::step::tree::kinematics::{mocap_quat, read_quat};
+use crate::step::tree::kinematics::{from_reference, mocap_quat, read_quat};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
 /// Link frames for output.
@@ -17,6 +17,7 @@ pub struct Poses;
 impl Stage for Poses {
     const READS: &'static [A] = &[
         A::JointQ,
+        A::Params,
         A::MocapQuat,
         A::Rotation,
         A::Origin,
@@ -26,19 +27,18 @@ impl Stage for Poses {
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-        let w = &mut b.work;
         for (k, body) in m.bodies.iter().enumerate() {
             // orientation before the joint moves: that of the parent, then the rest rotation
             let rest = quat::constant(body.quat);
             let carried = match body.parent {
-                Some(parent) => mul(w.orientation[parent], rest),
+                Some(parent) => mul(b.work.orientation[parent], rest),
                 None => rest,
             };
             // the rotation of the joint follows; a free or mocap body has its orientation in the world
-            w.orientation[k] = match body.motion {
+            b.work.orientation[k] = match body.motion {
                 Motion::Revolute => {
                     // (0, 0, sin q/2, cos q/2) from the right
-                    let half = cx.get(&b.joint_q[body.coord]) * C::F::c(0.5);
+                    let half = from_reference(cx, m, b, body) * C::F::c(0.5);
                     let (sin, cos) = half.sincos();
                     turn_z(carried, sin, cos)
                 }
@@ -48,6 +48,7 @@ impl Stage for Poses {
                 Motion::Mocap => mocap_quat(&b.mocap_quat, body.coord),
             };
         }
+        let w = &mut b.work;
         for (k, frame) in m.frames.iter().enumerate() {
             // frames of links: R p + o from the reference point of the tree, which comes last
             let (position, rest) = (Vec3::constant(frame.position), quat::constant(frame.quat));

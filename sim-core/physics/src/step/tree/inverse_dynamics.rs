@@ -15,6 +15,7 @@ use crate::constants::{Body, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial, symmetric};
 use crate::math::vec3::{Mat3, Vec3};
+use crate::step::tree::kinematics::from_reference;
 use crate::step::{BlockOf, ConstantsOf, gravity, masses, param};
 
 /// Writes the forces that `joint_qdd` needs at this state, to `missing`.
@@ -46,7 +47,7 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
     // from the leaves: τ = z · n or z · f, then the force goes on to the carrier
     for (k, body) in m.bodies.iter().enumerate().rev() {
         // what body and subtree need, about the origin of the body
-        let arm = arm(cx, b, k, body);
+        let arm = arm(cx, m, b, k, body);
         let w = &mut b.work;
         let Spatial([force, moment]) = w.force[k];
         let (axes, d) = (w.rotation[k], body.dof);
@@ -87,7 +88,7 @@ pub(in crate::step) fn proper_accelerations<C: Cx>(
     // gravity as an acceleration of the base by -g
     let base = Spatial([-gravity(m, &b.params), Vec3::zero()]);
     for (k, body) in m.bodies.iter().enumerate() {
-        let arm = arm(cx, b, k, body);
+        let arm = arm(cx, m, b, k, body);
         let w = &mut b.work;
         // of the carrier: a, α and ω
         let (above, spin) = match body.parent {
@@ -169,6 +170,7 @@ pub(in crate::step) fn point_acceleration<F: Num>(
 #[inline(always)]
 fn arm<C: Cx>(
     cx: &mut C,
+    m: &ConstantsOf<C>,
     b: &BlockOf<C>,
     k: usize,
     body: &Body<<C::F as Num>::Real>,
@@ -180,7 +182,10 @@ fn arm<C: Cx>(
         None => Vec3::constant(body.position),
     };
     match body.motion {
-        Motion::Prismatic => w.rotation[k][2].scale_add(cx.get(&b.joint_q[body.coord]), rest),
+        Motion::Prismatic => {
+            let slide = from_reference(cx, m, b, body);
+            w.rotation[k][2].scale_add(slide, rest)
+        }
         Motion::Revolute | Motion::Ball | Motion::Free | Motion::Mocap => rest,
     }
 }

@@ -16,11 +16,13 @@
 //! loses. An arm leads from the point of a body's carrier to that of the body.
 
 use crate::arrays::{Array as A, Block};
+use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::quat;
 use crate::math::spatial::{Inertia, Spatial};
 use crate::math::vec3::{Mat3, Vec3};
+use crate::step::params::moved_by;
 use crate::step::{BlockOf, ConstantsOf, Stage, masses};
 
 /// Frames, motion axes and inertias in the world.
@@ -83,13 +85,13 @@ pub fn place_body<C: Cx>(
     let body = &m.bodies[k];
     // the pose at q = 0, then the joint's slide, then its rotation
     let (rest, place) = at_zero(b, body);
-    let place = slid(cx, b, body, rest, place);
+    let place = slid(cx, m, b, body, rest, place);
     // R(parent) r(b) stays apart for the arm: p(b) - p(parent) would have the rounding of both
     let origin = match body.parent {
         Some(parent) => b.work.origin[parent] + place,
         None => place,
     };
-    let (rotation, origin) = moved(cx, b, body, rest, origin);
+    let (rotation, origin) = moved(cx, m, b, body, rest, origin);
     b.work.rotation[k] = rotation;
     b.work.origin[k] = origin;
     place
@@ -113,6 +115,7 @@ fn at_zero<F: Num, V>(b: &Block<F, V>, body: &Body<F::Real>) -> (Mat3<F>, Vec3<F
 #[inline(always)]
 fn slid<C: Cx>(
     cx: &mut C,
+    m: &ConstantsOf<C>,
     b: &BlockOf<C>,
     body: &Body<<C::F as Num>::Real>,
     rest: Mat3<C::F>,
@@ -120,8 +123,23 @@ fn slid<C: Cx>(
 ) -> Vec3<C::F> {
     // + z q along the axis at rest
     match body.motion {
-        Motion::Prismatic => rest[2].scale_add(cx.get(&b.joint_q[body.coord]), place),
+        Motion::Prismatic => rest[2].scale_add(from_reference(cx, m, b, body), place),
         _ => place,
+    }
+}
+
+/// Position of a hinge or a slide, less what its reference has moved by where that varies [rad or m].
+#[inline(always)]
+pub(in crate::step) fn from_reference<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    body: &Body<<C::F as Num>::Real>,
+) -> C::F {
+    let q = cx.get(&b.joint_q[body.coord]);
+    match moved_by(m, &b.params, Param::JointRef, body.dof) {
+        Some(moved) => q - moved,
+        None => q,
     }
 }
 
@@ -129,24 +147,25 @@ fn slid<C: Cx>(
 #[inline(always)]
 fn moved<C: Cx>(
     cx: &mut C,
+    m: &ConstantsOf<C>,
     b: &mut BlockOf<C>,
     body: &Body<<C::F as Num>::Real>,
     rest: Mat3<C::F>,
     origin: Vec3<C::F>,
 ) -> (Mat3<C::F>, Vec3<C::F>) {
     let Mat3([x, y, z]) = rest;
-    let (c, d, w) = (body.coord, body.dof, &mut b.work);
+    let (c, d) = (body.coord, body.dof);
     match body.motion {
         Motion::Revolute => {
             // E Rz(q) rotates x and y in their plane and leaves z, S = (p × z, z)
-            let (sin, cos) = cx.get(&b.joint_q[c]).sincos();
-            w.motion[d] = Spatial([origin.cross(z), z]);
+            let (sin, cos) = from_reference(cx, m, b, body).sincos();
+            b.work.motion[d] = Spatial([origin.cross(z), z]);
             let columns = [y.scale_add(sin, x * cos), y * cos - x * sin, z];
             (Mat3(columns), origin)
         }
         Motion::Prismatic => {
             // S = (z, 0)
-            w.motion[d] = Spatial([z, Vec3::zero()]);
+            b.work.motion[d] = Spatial([z, Vec3::zero()]);
             (rest, origin)
         }
         Motion::Ball => {
@@ -154,7 +173,7 @@ fn moved<C: Cx>(
             let Mat3([x, y, z]) = quat::matrix(read_quat(cx, &b.joint_q, c));
             let rotation = Mat3([rest * x, rest * y, rest * z]);
             for i in 0..3 {
-                w.motion[d + i] = Spatial([origin.cross(rotation[i]), rotation[i]]);
+                b.work.motion[d + i] = Spatial([origin.cross(rotation[i]), rotation[i]]);
             }
             (rotation, origin)
         }
@@ -168,18 +187,18 @@ fn moved<C: Cx>(
                 cx.get(&b.joint_q[c + 2]),
             ]);
             // the reference point is the centre of mass, about which S = 1
-            w.reference[body.tree] = position + center;
+            b.work.reference[body.tree] = position + center;
             for i in 0..3 {
                 let mut axis = Vec3::zero();
                 axis[i] = C::F::c(1.0);
-                w.motion[d + i] = Spatial([axis, Vec3::zero()]);
-                w.motion[d + 3 + i] = Spatial([Vec3::zero(), axis]);
+                b.work.motion[d + i] = Spatial([axis, Vec3::zero()]);
+                b.work.motion[d + 3 + i] = Spatial([Vec3::zero(), axis]);
             }
             (rotation, Vec3::zero() - center)
         }
         Motion::Mocap => {
             // the client's position is the reference point, so the origin is 0
-            w.reference[body.tree] = Vec3(std::array::from_fn(|i| b.mocap_pos[3 * c + i]));
+            b.work.reference[body.tree] = Vec3(std::array::from_fn(|i| b.mocap_pos[3 * c + i]));
             (quat::matrix(mocap_quat(&b.mocap_quat, c)), Vec3::zero())
         }
     }

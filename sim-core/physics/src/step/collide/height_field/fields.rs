@@ -258,6 +258,7 @@ fn candidates<C: Cx>(cx: &mut C, table: Table, out: &Points<C>) -> Points<C> {
         // candidates take no room, and friction and tangents come with the contacts that are kept
         mu: None,
         varying: None,
+        softness: None,
         along: None,
         room: Room {
             is_tight: false,

@@ -1,6 +1,6 @@
 //! The list that contact points go to, and the room that a world has for them.
 
-use crate::constants::contact::row;
+use crate::constants::contact::{row, soft};
 use crate::lane::{Cx, MaskOf, Num, Table};
 use crate::math::vec3::Vec3;
 use crate::{push, when};
@@ -21,6 +21,8 @@ pub struct Points<C: Cx> {
     pub mu: Option<C::F>,
     /// Torsional and rolling friction over that of sliding [m], and inverse weight [1/kg], where one of them varies.
     pub varying: Option<[C::F; 3]>,
+    /// Softness, where it varies; see [`soft`].
+    pub softness: Option<[C::F; soft::COLUMNS]>,
     /// Direction of the first tangent where it is not 0 [–]; none where tangents may have any direction.
     pub along: Option<Vec3<C::F>>,
     /// What a world has room for.
@@ -69,7 +71,7 @@ impl<C: Cx> Points<C> {
             mask
         };
         let (list, table, pair) = (&mut self.list, self.table, self.pair);
-        let (along, mu, varying) = (self.along, self.mu, self.varying);
+        let (along, mu, varying, softness) = (self.along, self.mu, self.varying, self.softness);
         // from the reference point of the rows, with the direction of normals that the rows have
         let (point, normal) = (self.base + point, normal * self.flip);
         push!(cx, *list, mask, fresh, {
@@ -83,6 +85,11 @@ impl<C: Cx> Points<C> {
             if let Some(varying) = varying {
                 for (i, x) in varying.iter().enumerate() {
                     cx.init(table, fresh, row::VARYING + i, *x);
+                }
+            }
+            if let Some(softness) = softness {
+                for (i, x) in softness.iter().enumerate() {
+                    cx.init(table, fresh, row::SOFTNESS + i, *x);
                 }
             }
             if let Some(along) = along {

@@ -264,11 +264,11 @@ fn records<C: Cx>(
             let pair = cx.load(m.contacts.memory.rows, r, row::PAIR);
             turn(m, b, contact_sensor, pair, &mut contact);
             let is_found = matches::<C>(b, contact_sensor, &contact);
-            // slots are sorted by rising keys: distance, -|F|², or the count of contacts so far
+            // slots are sorted by rising keys: distance, -|F|², or the pair's place in MuJoCo's order
             let key = match contact_sensor.reduction {
                 Reduction::LeastDistance => contact.distance,
                 Reduction::LargestForce => -contact.force.dot(contact.force),
-                Reduction::First | Reduction::NetForce => cx.get(&total),
+                Reduction::First | Reduction::NetForce => cx.pick(m.sensors.ranks, pair, 0),
             };
             // the total also counts contacts for which no slot is left
             let more = cx.get(&total) + C::F::select(is_found, C::F::c(1.0), zero);

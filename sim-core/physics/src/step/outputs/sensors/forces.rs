@@ -9,6 +9,7 @@ use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
 use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::Vec3;
+use crate::step::constraints::joint_rows::range;
 use crate::step::constraints::ties::length;
 use crate::step::outputs::sites::reference;
 use crate::step::outputs::sites::{position, to_local};
@@ -118,6 +119,7 @@ impl Stage for Forces {
     const READS: &'static [A] = &[
         A::JointQ,
         A::JointQd,
+        A::Params,
         A::ActuatorForce,
         A::QfrcActuator,
         A::EfcD,
@@ -186,7 +188,8 @@ fn dof_limit<C: Cx>(
         let property = match part {
             LimitPart::Position => {
                 let q = cx.get(&b.joint_q[m.dofs[dof].coord]);
-                (q - C::F::k(limit.lower)).min(C::F::k(limit.upper) - q)
+                let [lower, upper] = range(m, &b.params, limit);
+                (q - lower).min(upper - q)
             }
             LimitPart::Velocity => side * cx.get(&b.joint_qd[dof]),
             LimitPart::Force => cx.get(&b.efc_force[first + k]),
