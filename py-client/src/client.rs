@@ -15,6 +15,7 @@ use crate::advice::Advice;
 use crate::errors::{protocol, raise};
 use crate::frame::PyFrame;
 use crate::input::{InputTable, Mask, Place, Seeds};
+use crate::xla::{self, Line};
 
 /// Names, columns, columns of each name, parts of the robots.
 type Layout = (Vec<String>, usize, usize, Option<Vec<Place>>);
@@ -24,7 +25,7 @@ type Layout = (Vec<String>, usize, usize, Option<Vec<Place>>);
 pub(crate) struct Client {
     description: Arc<Description>,
     // None once closed; a step that runs in another thread keeps its own reference until it returns
-    connection: Mutex<Option<Arc<Connection>>>,
+    connection: Arc<Line>,
     process: u32,
     table: InputTable,
     advice: Advice,
@@ -50,7 +51,7 @@ impl Client {
             description: Arc::clone(connection.description()),
             table: InputTable::new(connection.description()),
             advice: Advice::new(connection.description()),
-            connection: Mutex::new(Some(connection.into())),
+            connection: Line::new(connection),
             process: std::process::id(),
             card: Mutex::default(),
         })
@@ -223,6 +224,12 @@ impl Client {
         self.waiting(py, |hook| connection.controller(hook))
     }
 
+    /// The number under which programs of XLA know this client, and how many calls they have made.
+    fn xla_token(&self, py: Python<'_>) -> PyResult<(u32, u32)> {
+        self.connection(py)?;
+        Ok(py.detach(|| xla::token(&self.connection, &self.description)))
+    }
+
     /// Give the lease back; the next command takes one again.
     fn release(&self, py: Python<'_>) -> PyResult<()> {
         let connection = self.connection(py)?;
@@ -254,9 +261,8 @@ impl Client {
     }
 
     fn held(&self) -> MutexGuard<'_, Option<Arc<Connection>>> {
-        self.connection
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        let client = self.connection.client.lock();
+        client.unwrap_or_else(PoisonError::into_inner)
     }
 
     fn closed(&self, py: Python<'_>) -> PyErr {

@@ -18,8 +18,13 @@ pub(crate) fn raise(py: Python<'_>, class: &str, message: impl Into<String>) -> 
 
 /// A protocol error as the exception that a Python caller expects.
 pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
+    raise(py, class(error), error.to_string())
+}
+
+/// The name of that exception.
+pub(crate) fn class(error: &ProtocolError) -> &'static str {
     use ProtocolError::*;
-    let class = match error {
+    match error {
         BadName { .. } | Grouped { .. } => "ArgumentError",
         NoDaemon { .. } => "UnknownDaemon",
         ProtocolVersion { .. } | Handshake { .. } | Malformed { .. } => "ProtocolMismatch",
@@ -43,6 +48,5 @@ pub(crate) fn protocol(py: Python<'_>, error: &ProtocolError) -> PyErr {
         Timeout { .. } | Silent { .. } => "WaitTimeout",
         Root { .. } | NameTaken { .. } => "LaunchError",
         _ => "TransportError",
-    };
-    raise(py, class, error.to_string())
+    }
 }

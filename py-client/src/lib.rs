@@ -21,6 +21,7 @@ mod random;
 mod rays;
 mod rows;
 mod scene;
+mod xla;
 
 use std::ffi::OsString;
 
@@ -102,6 +103,8 @@ mod core {
         compiled_scene, load_scene, parse_scene, read_mesh, read_mujoco, read_urdf, save_scene,
         scene_to_toml,
     };
+    #[pymodule_export]
+    use super::xla::{xla_call, xla_function, xla_handlers};
     #[pymodule_export]
     use super::{command_line, command_rows, field_names, param_names};
 

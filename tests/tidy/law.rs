@@ -29,15 +29,16 @@ pub const DOORS: [(&str, &str); 24] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 49] = [
+pub const UNSAFE: [&str; 50] = [
     "py-client/src/frame.rs",                              // NumPy views
-    "sim-core/compile/src/lib.rs",                         // runs machine code
-    "sim-core/device/src/host_pages.rs",                   // imports pages of the host
-    "sim-core/device/src/program/portable.rs",             // programs without checks at run time
-    "sim-core/device/src/software/exit.rs",                // process exit beside a driver thread
+    "py-client/src/xla/abi.rs", // structs and arrays of XLA's foreign functions
+    "sim-core/compile/src/lib.rs", // runs machine code
+    "sim-core/device/src/host_pages.rs", // imports pages of the host
+    "sim-core/device/src/program/portable.rs", // programs without checks at run time
+    "sim-core/device/src/software/exit.rs", // process exit beside a driver thread
     "sim-core/device/src/vulkan/export.rs", // the driver's memory for other processes
     "sim-core/device/src/vulkan/memory.rs", // the driver's memory, and the host's
-    "sim-core/device/src/vulkan/mod.rs",    // the driver's handles
+    "sim-core/device/src/vulkan/mod.rs", // the driver's handles
     "sim-core/device/src/vulkan/pipeline.rs", // as mod.rs
     "sim-core/device/src/vulkan/recording.rs", // as mod.rs
     "sim-core/device/src/vulkan/stamps.rs", // as mod.rs

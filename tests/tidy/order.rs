@@ -344,6 +344,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "frame",
             "not_finite",
             "advice",
+            "xla",
             "client",
             "scene",
             "dynamics",
@@ -354,5 +355,9 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "random",
             "rays",
         ],
+    ),
+    (
+        "py-client/src/xla",
+        &["abi", "arrays", "function", "simulation"],
     ),
 ];

@@ -276,6 +276,9 @@ class Client:
     def wait_newer(self, timeout: float, /) -> Frame | None: ...
     def timing(self, clear: bool, /) -> str: ...
     def controller(self) -> int | None: ...
+    def xla_token(self) -> tuple[int, int]:
+        """Return the number under which programs of XLA know this client, and how many calls they have made."""
+
     def release(self) -> None: ...
     def close(self) -> None: ...
 
@@ -444,6 +447,41 @@ def draw(
 
     Raises:
         ArgumentError: A shape or the stream is not valid. A wrong dtype is a TypeError.
+    """
+
+def xla_handlers(major: int, minor: int) -> tuple[int, int]:
+    """Return the addresses of the handlers of XLA's foreign functions: of the CPU, and of devices that are refused.
+
+    Args:
+        major: Major version of the interface.
+        minor: Minor version; the handlers answer with it, or with the newest that is known here.
+
+    Raises:
+        ValueError: The major version is not known.
+    """
+
+def xla_function(function: Any, name: str, /) -> int:
+    """Return the number of a function from now on known to programs of XLA.
+
+    Args:
+        function: It takes the name of a call and a list of arrays, and returns a list of arrays.
+        name: What it is, for messages.
+    """
+
+def xla_call(
+    call: str, inputs: str, fields: str, operands: list[NDArray[Any]], outputs: list[NDArray[Any]], /
+) -> None:
+    """Make the call of a program of XLA with arrays of NumPy.
+
+    Args:
+        call: ``"step"``, ``"reset"``, ``"write"`` or ``"forward"``.
+        inputs: Names of the operands behind the token and, of a reset or a write, the mask.
+        fields: Names of the outputs behind the token.
+        operands: The token, uint32, shape ``(2,)``, and others, contiguous.
+        outputs: Arrays that are overwritten: the next token, and the fields; bool comes as uint8.
+
+    Raises:
+        CommandRefused: The token was used before, or an array does not fit. Other errors are those of the call.
     """
 
 def groups(name: str, wait: float | None = None, /) -> int: ...
