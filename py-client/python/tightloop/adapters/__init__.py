@@ -7,6 +7,7 @@
 | `tightloop.adapters.skrl` | skrl 2 | `SkrlEnv` | in the next step |
 | `tightloop.adapters.torchrl` | torchrl | `TorchRlEnv` | when torchrl resets them |
 | `tightloop.adapters.rllib` | RLlib | `register` | in the next step |
+| `tightloop.adapters.jax` | JAX | `JaxEnv` and `JaxSim`, inside of programs | in the same step |
 | `tightloop.adapters.ray` | Ray | `RayVectorEnv`, a vector environment over the nodes of a cluster | as asked for |
 | `tightloop.adapters.torchrun` | torchrun | `Rank`, with the share of the worlds of a process | as asked for |
 

@@ -1,0 +1,187 @@
+"""A task in programs of JAX."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from tightloop import _core
+from tightloop.adapters.environment import Given, adapted_environment, library
+from tightloop.adapters.jax.programs import Program, Result, token_as_given, token_of
+from tightloop.checks.signatures import checked_calls
+from tightloop.errors import ArgumentError, SimClosed
+
+jax = library("jax", install="jax")
+jnp = library("jax.numpy", install="jax")
+
+#: Names in the infos of a step that are no values of the task.
+_OURS = ("final_obs", "final_info", "fault")
+#: Calls so far of a token that fits at any time.
+_ANY = 2**32 - 1
+
+
+@checked_calls
+class JaxEnv:
+    """A `VectorEnv` whose resets and steps are part of programs of JAX, under ``jax.jit``, ``lax.scan`` and the like.
+
+    Worlds start their next episode in the same step, so a program has no branches for it. The worlds stay in the daemon
+    and the episodes in this process, so `step` is not pure: a state that was used before is an error. Each step runs
+    the task in Python, with the results of `VectorEnv.step`, bit for bit.
+
+    Errors inside of a program are JAX's ``jax.errors.JaxRuntimeError``. Its text has the name of tightloop's exception
+    and its message.
+
+    Attributes:
+        env: The `VectorEnv`.
+        num_envs: Number of worlds.
+        observation_size: Length of an observation.
+        action_size: Length of an action.
+        via: How programs call: ``"ffi"``, or ``"io_callback"``.
+    """
+
+    def __init__(self, env: Given, num_envs: int | None = None, *, via: str | None = None, **options: Any) -> None:
+        """Adapt an environment of the mode ``SAME_STEP``, or make one for a task.
+
+        Args:
+            env: A `VectorEnv`, or a task.
+            num_envs: Number of worlds, for a task.
+            via: As of `JaxSim`.
+            **options: Further arguments of `VectorEnv`, for a task.
+
+        Raises:
+            ArgumentError: The environment has another autoreset mode, or an argument is not valid.
+            MissingLibrary: ``via="ffi"``, and this JAX has no foreign functions.
+        """
+        self._program = Program(via)
+        self.via = self._program.via
+        self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        self.num_envs: int = self.env.num_envs
+        (self.observation_size,), (self.action_size,) = (
+            space.shape for space in (self.env.single_observation_space, self.env.single_action_space)
+        )
+        self._results = self._probed()
+        name = type(getattr(self.env, "task", self.env)).__name__
+        self._number = _core.xla_function(_Weak(self), f"the environment of {name}")
+
+    def reset(self, seed: Any, state: Any = None) -> tuple[Any, Any]:
+        """Start episodes in all worlds. They depend on the seeds alone.
+
+        Args:
+            seed: A key of ``jax.random``, or a whole number from 0 to 2**32 - 1: then world i gets the seed
+                ``seed + i``, as in `VectorEnv.reset`.
+            state: The state that the last step returned, if the same program stepped before. It puts the reset behind
+                that step.
+
+        Returns:
+            The state, and observations, shape ``(num_envs, observation_size)``.
+
+        Raises:
+            ArgumentError: The seed is neither, or ``state`` is no state.
+        """
+        token = token_of(self._number, _ANY) if state is None else token_as_given(state)
+        state, (obs,) = self._program.call("reset", (), self._results[:1], token, _seeds(seed, self.num_envs))
+        return state, obs
+
+    def step(self, state: Any, action: Any) -> tuple[Any, Any, Any, Any, Any, dict[str, Any]]:
+        """Advance all worlds by one control step, and start the next episode in worlds whose episode ended.
+
+        Args:
+            state: The state that the last call returned.
+            action: Shape ``(num_envs, action_size)``, clipped to ``env.action_space``.
+
+        Returns:
+            ``state, obs, reward, terminated, truncated, info``, worlds first. ``info["final_obs"]`` has the last
+            observation of episodes that ended in this step, and ``obs`` in other worlds. ``info["fault"]`` has the bits
+            of ``status`` of faulted worlds. Further entries are ``"success"`` and `Task.metrics`, of the step before a
+            new episode began, and ``"privileged"`` if the task has them.
+
+        Raises:
+            ArgumentError: The action has a wrong shape or type, ``state`` is no state, or JAX differentiates or batches
+                the step.
+        """
+        action, shape = jnp.asarray(action), (self.num_envs, self.action_size)
+        if action.shape != shape or not jnp.issubdtype(action.dtype, jnp.number):
+            raise ArgumentError(f"action: expected real numbers of shape {shape}; got {action.dtype} of {action.shape}")
+        action = action.astype(jnp.float32)
+        state, made = self._program.call("step", ("action",), self._results, token_as_given(state), action)
+        obs, reward, terminated, truncated, *rest = made
+        names = [result.name for result in self._results[4:]]
+        return state, obs, reward, terminated, truncated, dict(zip(names, rest, strict=True))
+
+    def close(self) -> None:
+        """End the simulation."""
+        self.env.close()
+
+    def _probed(self) -> list[Result]:
+        """Return what a step returns, found by a reset and a step."""
+        obs, _ = self.env.reset(seed=0)
+        obs, reward, terminated, truncated, infos = self.env.step(
+            np.zeros((self.num_envs, self.action_size), np.float32)
+        )
+        named = {"obs": obs, "reward": reward, "terminated": terminated, "truncated": truncated, "final_obs": obs}
+        named["fault"] = np.zeros(self.num_envs, np.uint32)
+        # sums of rewards are there where an episode ends alone
+        further = [name for name in infos if name[0] != "_" and "/" not in name and name not in _OURS]
+        named.update({name: np.asarray(infos[name]) for name in further})
+        return [
+            Result(name, array.shape, np.dtype(jax.dtypes.canonicalize_dtype(array.dtype)))
+            for name, array in named.items()
+        ]
+
+    def _called(self, call: str, given: list[NDArray[Any]]) -> list[NDArray[Any]]:
+        """Make a call of a program."""
+        if call == "reset":
+            obs, _ = self.env.reset(seed=given[0].tolist())
+            return [_as_result(obs, self._results[0])]
+        obs, reward, terminated, truncated, infos = self.env.step(given[0])
+        made = {"obs": obs, "reward": reward, "terminated": terminated, "truncated": truncated, **infos}
+        final = obs
+        if "final_obs" in infos:
+            ended = infos["_final_obs"]
+            final = np.where(ended[:, None], infos["final_obs"], obs)
+            for name, mine in infos["final_info"].items():
+                if name[0] != "_" and name in made:
+                    rows = ended.reshape(-1, *[1] * (np.ndim(mine) - 1))
+                    made[name] = np.where(rows, mine, made[name])
+        made["final_obs"] = final
+        made.setdefault("fault", np.zeros(self.num_envs, np.uint32))
+        return [_as_result(made[result.name], result) for result in self._results]
+
+
+class _Weak:
+    """The calls of an environment, which they do not keep alive."""
+
+    def __init__(self, env: JaxEnv) -> None:
+        self._env = weakref.ref(env)
+
+    def __call__(self, call: str, given: list[NDArray[Any]]) -> list[NDArray[Any]]:
+        env = self._env()
+        if env is None:
+            raise SimClosed("the JaxEnv of this program was dropped; keep it as long as the program runs")
+        return env._called(call, given)
+
+
+def _as_result(array: Any, result: Result) -> NDArray[Any]:
+    return np.ascontiguousarray(array, result.dtype)
+
+
+def _seeds(seed: Any, count: int) -> Any:
+    """Return a seed per world, uint32."""
+    if isinstance(seed, int | np.integer) and not isinstance(seed, bool):
+        if not 0 <= seed < 2**32:
+            raise ArgumentError(f"reset: seed is {seed}; give a whole number from 0 to 2**32 - 1")
+        seed = jnp.uint32(seed)
+    dtype, shape = getattr(seed, "dtype", None), getattr(seed, "shape", None)
+    array: Any = seed
+    is_key = dtype is not None and jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) and shape == ()
+    if is_key or (dtype == np.uint32 and shape == (2,)):
+        return jax.random.bits(array, (count,), np.uint32)
+    if dtype is None or dtype.kind not in "iu" or shape != ():
+        given = f"{seed!r:.80}" if dtype is None else f"of {dtype} and shape {shape}"
+        cure = "give a key of jax.random, or a whole number from 0 to 2**32 - 1"
+        raise ArgumentError(f"reset: seed is {given}; {cure}")
+    return array.astype(np.uint32) + jnp.arange(count, dtype=np.uint32)
