@@ -20,8 +20,8 @@ import matplotlib
 import numpy as np
 from franka_lesson import FRAMES, REFERENCE, URDF
 from franka_lesson import scene as arm_on_its_stand
+from learning.places import OUT
 from numpy.typing import NDArray
-from places import OUT
 from tqdm import tqdm
 
 import tightloop as tl

@@ -17,8 +17,8 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from learning.places import OUT
 from numpy.typing import NDArray
-from places import OUT
 from tqdm import tqdm
 
 import tightloop as tl

@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 from learning.filming import Shooting, film_of
+from learning.places import OUT
 from learning.program import needed
 from numpy.typing import NDArray
-from places import OUT
 
 from evaluation import metrics
 from tightloop.env import AutoresetMode, VectorEnv

@@ -38,10 +38,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import numpy as np
 from learning.films import Films
 from learning.log import Log, Statistics
+from learning.places import OUT, PLAY
 from learning.program import draw, needed, report
 from learning.watch import TermWatch, nothing_learnt
 from numpy.typing import NDArray
-from places import OUT, PLAY
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
 from tightloop.env import AutoresetMode, VectorEnv, policy_metadata

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from learning.places import OUT
 from numpy.typing import NDArray
-from places import OUT
 
 import tightloop as tl
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from learning.places import OUT
 from learning.program import needed, report
 from numpy.typing import NDArray
-from places import OUT
 
 from evaluation import evaluate, told
 from tightloop.adapters.torchrun import Rank

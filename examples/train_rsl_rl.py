@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from learning.places import OUT
 from learning.program import command_line, needed, report
 from numpy.typing import NDArray
-from places import OUT
 
 from evaluation import evaluate, told
 from tightloop.env import policy_metadata

@@ -24,7 +24,9 @@ cp benches/gpu/card_report.py benches/gpu/gpu_peers.py benches/gpu/tensors.py be
 # what gpu_peers.py imports, and the robots of these
 cp -r benches/record.py benches/robots "$folder/benches"
 cp benches/physics/contacts.py benches/physics/legged.py "$folder/benches/physics"
-cp -rL examples/franka_grasp.py examples/franka_lesson.py examples/places.py examples/assets "$folder/examples"
+cp -rL examples/franka_grasp.py examples/franka_lesson.py examples/assets "$folder/examples"
+mkdir -p "$folder/examples/learning"
+cp examples/learning/__init__.py examples/learning/places.py "$folder/examples/learning"
 cp tests/python/mujoco/mujoco_model.py "$folder/tests/python/mujoco"
 cp -r tests/data "$folder/tests"
 git describe --always --dirty '--exclude=*' >"$folder/commit"

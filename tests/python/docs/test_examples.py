@@ -35,6 +35,7 @@ TRAINING = {
     "ppo.py": "tests/rl/test_ppo.py",
     "sim2sim.py": "tests/rl/test_trained.py",
     "train_ddp.py": "tests/rl/test_train_ddp.py",
+    "train_jax.py": "tests/rl/test_jax_env.py",
     "train_rsl_rl.py": "tests/rl/test_train_examples.py",
     "train_sb3.py": "tests/rl/test_train_examples.py",
     "train_skrl.py": "tests/rl/test_train_examples.py",
@@ -47,6 +48,7 @@ LIBRARIES = {
     "ppo.py": "matplotlib onnx onnxscript tensorboard torch tqdm",
     "sim2sim.py": "mujoco onnxruntime",
     "train_ddp.py": "matplotlib onnx onnxscript tensorboard torch tqdm",
+    "train_jax.py": "jax",
     "train_rsl_rl.py": "onnx onnxscript rsl-rl-lib torch tqdm",
     "train_sb3.py": "stable-baselines3 torch tqdm",
     "train_skrl.py": "skrl torch tqdm",
@@ -59,8 +61,6 @@ missing, sys.argv = sys.argv[1].split(), sys.argv[2:]
 importlib.util.find_spec = lambda name, package=None: None if name in missing else find_spec(name, package)
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
-# Modules of the others.
-PARTS = {"places.py"}
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -90,13 +90,11 @@ def test_missing_libraries_are_named_at_the_start(name, tmp_path):
 
 def test_every_example_has_a_test():
     there = {path.name for path in EXAMPLES.glob("*.py")}
-    assert there == {*RUNS, *TRAINING, *PARTS}
+    assert there == {*RUNS, *TRAINING}
     for name, test in TRAINING.items():
         assert name.removesuffix(".py") in (REPOSITORY / test).read_text(), f"{test} does not run {name}"
     texts = {path: path.read_text() for path in [*EXAMPLES.glob("*.py"), *EXAMPLES.glob("learning/*.py")]}
-    modules = [Path(name).stem for name in PARTS] + [
-        f"learning.{path.stem}" for path in EXAMPLES.glob("learning/[a-z]*.py")
-    ]
+    modules = [f"learning.{path.stem}" for path in EXAMPLES.glob("learning/[a-z]*.py")]
     for module in modules:
         assert any(f"from {module} import" in text for text in texts.values()), f"nobody imports {module}"
     assert [path.name for path in EXAMPLES.glob("*.rs")] == ["franka_lesson.rs"]

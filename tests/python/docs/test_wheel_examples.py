@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_examples import EXAMPLES, LIBRARIES, PARTS, WITHOUT
+from test_examples import EXAMPLES, LIBRARIES, WITHOUT
 
 import tightloop
 from tightloop import examples
@@ -31,7 +31,7 @@ def test_the_wheel_has_the_examples_of_the_repository():
 
 
 def test_every_program_is_listed_with_what_it_does(tmp_path):
-    programs = {path.stem for path in EXAMPLES.glob("*.py")} - {name.removesuffix(".py") for name in PARTS}
+    programs = {path.stem for path in EXAMPLES.glob("*.py")}
     for arguments in ([], ["list"]):
         done = call("tightloop.examples", *arguments, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
@@ -67,8 +67,8 @@ def test_nothing_is_overwritten_and_wrong_names_are_reported(tmp_path):
     assert [path.name for path in own.parent.iterdir()] == ["own_task.py"]
     done = call("tightloop.examples", "run", "own_tsk", cwd=tmp_path)
     assert done.returncode == 2 and "no example 'own_tsk'; there are" in done.stderr and "own_task" in done.stderr
-    with pytest.raises(ArgumentError, match="places"):
-        examples.program("places")
+    with pytest.raises(ArgumentError, match="learning"):
+        examples.program("learning")
 
 
 def test_all_are_copied_into_a_folder(tmp_path):

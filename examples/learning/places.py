@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_ABOVE = Path(__file__).resolve().parents[1]
+_ABOVE = Path(__file__).resolve().parents[2]
 #: ``out`` of the checkout; elsewhere, as in an installed wheel, ``out`` of the working directory.
 OUT = (_ABOVE if (_ABOVE / "Makefile").is_file() else Path.cwd()) / "out"
 #: How `play.py` is called from there.
