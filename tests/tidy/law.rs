@@ -56,6 +56,7 @@ pub const UNSAFE: [&str; 50] = [
     "sim-core/physics/src/compiled.rs", // what only a processor with the instructions may run
     "sim-core/physics/src/lane/simd/neon.rs", // intrinsics
     "sim-core/physics/src/lane/simd/x86.rs", // intrinsics
+    "sim-core/policy/src/kernel.rs",    // instruction sets
     "sim-daemon/client-c/src/calls.rs", // pointers of C, which pointers.rs checks
     "sim-daemon/client-c/src/client.rs", // as calls.rs
     "sim-daemon/client-c/src/description.rs", // pointers to texts of the same struct
@@ -70,7 +71,7 @@ pub const UNSAFE: [&str; 50] = [
     "sim-daemon/protocol/src/memory/reentrant.rs", // a value that a lock abandons
     "sim-daemon/protocol/src/memory/storage.rs", // what mapped files hold
     "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
-    "sim-daemon/src/serve/server.rs",   // samples that a device writes to
+    "sim-daemon/src/serve/shown.rs",    // samples that a device writes to
     "sim-daemon/system/src/unix/faults.rs", // a handler of missing pages
     "sim-daemon/system/src/unix/files.rs", // the descriptor of a listener
     "sim-daemon/system/src/unix/forks.rs", // a handler of forks

@@ -80,6 +80,7 @@ fn sources() -> Vec<String> {
         "sim-core/device/src",
         "sim-core/engine/src",
         "sim-core/ik/src",
+        "sim-core/policy/src",
         "sim-core/stages",
         "sim-daemon/src",
         "sim-daemon/client-c/src",
@@ -167,6 +168,10 @@ fn crates_know_only_what_they_may() {
         (
             "sim-core/ik/src",
             &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+        ),
+        (
+            "sim-core/policy/src",
+            &["sim_physics", "sim_model", "sim_engine", "sim_daemon"],
         ),
         (
             "sim-daemon/protocol/src",

@@ -317,6 +317,25 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "commands",
         ],
     ),
+    (
+        "sim-daemon/src/serve/rollout",
+        &[
+            "question",
+            "answer",
+            "memory",
+            "observation",
+            "commands",
+            "run",
+        ],
+    ),
+    (
+        "sim-core/policy/src",
+        &["error", "network", "activation", "kernel", "runner", "onnx"],
+    ),
+    (
+        "sim-core/policy/src/onnx",
+        &["protobuf", "tensor", "message", "layers", "chain"],
+    ),
     ("sim-daemon/src/export", &["refusal", "snapshot", "arrays"]),
     (
         "sim-daemon/src/serve",
@@ -352,6 +371,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "arrays",
             "picture",
             "observe",
+            "policy",
             "random",
             "rays",
         ],
