@@ -191,6 +191,11 @@ impl Client {
         self.frame(py, |hook| connection.ik(path, hook))
     }
 
+    fn rollout(&self, py: Python<'_>, path: &str) -> PyResult<PyFrame> {
+        let connection = self.connection(py)?;
+        self.frame(py, |hook| connection.rollout(path, hook))
+    }
+
     fn restore(
         &self,
         py: Python<'_>,

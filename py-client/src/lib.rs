@@ -17,6 +17,7 @@ mod not_finite;
 mod observe;
 mod parts;
 mod picture;
+mod policy;
 mod random;
 mod rays;
 mod rows;
@@ -94,6 +95,8 @@ mod core {
     use super::parts::{parts, visual_mesh};
     #[pymodule_export]
     use super::picture::Renderer;
+    #[pymodule_export]
+    use super::policy::PolicyNetwork;
     #[pymodule_export]
     use super::random::draw;
     #[pymodule_export]

@@ -414,7 +414,7 @@ pub(crate) fn apply(
             }
         }
         // the server answers a question before, and moves no world
-        Op::Forward | Op::Ik => {}
+        Op::Forward | Op::Ik | Op::Rollout => {}
         Op::Snapshot => snapshot::save(simulation, inbox)?,
         Op::Restore => snapshot::restore(simulation, inbox, masked)?,
     }

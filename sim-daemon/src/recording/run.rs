@@ -212,8 +212,9 @@ impl Run {
         };
         self.inbox.take(header, command.words).map_err(refused)?;
         let advance = match self.op() {
-            // the state that came before is what the restore has left; a snapshot or a question changes nothing
-            Op::Restore | Op::Snapshot | Op::Ik => Advance::Forward,
+            // the state that came before is what the restore has left; a snapshot or a question changes nothing, and the steps
+            // of a rollout came before
+            Op::Restore | Op::Snapshot | Op::Ik | Op::Rollout => Advance::Forward,
             _ => export::apply(&mut self.simulation, &self.inbox, &mut self.mask)
                 .map_err(|refusal| refused(refusal.reason))?,
         };

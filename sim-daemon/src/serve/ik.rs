@@ -6,8 +6,6 @@
 //! ```
 //! Everything is little endian. The worlds start at their positions unless the question has others. No world moves.
 
-use std::fs::OpenOptions;
-use std::io::{Read, Seek, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Deserialize;
@@ -19,6 +17,7 @@ use sim_protocol::host::Inbox;
 use crate::config::IkTask;
 use crate::export::refusal::{Refusal, refusal};
 use crate::export::snapshot;
+use crate::serve::exchange::{Exchange, arrays};
 
 /// What a file asks for, beside its arrays.
 #[derive(Deserialize)]
@@ -55,35 +54,20 @@ impl Ik {
     ) -> Result<(), Refusal> {
         let path = snapshot::path(inbox)?;
         let refuse = |problem: String| refused(&format!("{}: {problem}", path.display()));
-        let opened = OpenOptions::new().read(true).write(true).open(path);
-        let mut file = opened.map_err(|problem| refuse(format!("cannot be opened: {problem}")))?;
-        let status = file
-            .metadata()
-            .map_err(|problem| refuse(problem.to_string()))?;
-        if !status.is_file() {
-            return Err(refuse("is no file; give the path of one".to_owned()));
-        }
-        snapshot::check_room(3 * status.len()).map_err(refuse)?;
-        let mut bytes = Vec::with_capacity(status.len() as usize);
-        let read = (&file).take(status.len()).read_to_end(&mut bytes);
-        read.map_err(|problem| refuse(format!("cannot be read: {problem}")))?;
-        let answer = self.solve(simulation, &bytes, stop);
+        let question = Exchange::read(path, 3).map_err(refuse)?;
+        let answer = self.solve(simulation, &question, stop);
         let answer = answer.map_err(|problem| refused(&problem))?;
-        let written = file
-            .rewind()
-            .and_then(|()| file.set_len(0))
-            .and_then(|()| file.write_all(&answer));
-        written.map_err(|problem| refuse(format!("cannot be written: {problem}")))
+        question.answer(&answer).map_err(refuse)
     }
 
     fn solve(
         &mut self,
         simulation: &Simulation,
-        bytes: &[u8],
+        question: &Exchange,
         stop: &AtomicBool,
     ) -> Result<Vec<u8>, String> {
         let (question, task, arrays) =
-            parse(bytes).ok_or("the file is no question; use sim.ik")??;
+            parse(question).ok_or("the file is no question; use sim.ik")??;
         let [starts, posture, targets @ ..] = &arrays[..] else {
             return Err("the question lacks arrays; use sim.ik".to_owned());
         };
@@ -155,10 +139,8 @@ impl Ik {
 
 /// A question, the text of its task, and its arrays; none for other bytes.
 #[allow(clippy::type_complexity)]
-fn parse(bytes: &[u8]) -> Option<Result<(Question, &str, Vec<Vec<f64>>), String>> {
-    let (head, rest) = bytes.split_first_chunk::<8>()?;
-    let (json, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*head)).ok()?)?;
-    let text = std::str::from_utf8(json).ok()?;
+fn parse(question: &Exchange) -> Option<Result<(Question, &str, Vec<Vec<f64>>), String>> {
+    let (text, rest) = question.parts()?;
     let question: Question = match serde_json::from_str(text) {
         Ok(question) => question,
         Err(problem) => {
@@ -167,18 +149,7 @@ fn parse(bytes: &[u8]) -> Option<Result<(Question, &str, Vec<Vec<f64>>), String>
             )));
         }
     };
-    let (numbers, end) = rest.as_chunks::<8>();
-    let mut numbers = numbers.iter().map(|&bytes| f64::from_le_bytes(bytes));
-    let wanted = question
-        .lengths
-        .iter()
-        .try_fold(0usize, |sum, &n| sum.checked_add(n))?;
-    if !end.is_empty() || wanted != numbers.len() {
-        return None;
-    }
-    let lengths = question.lengths.iter();
-    let arrays = lengths.map(|&length| numbers.by_ref().take(length).collect());
-    let arrays = arrays.collect();
+    let arrays = arrays(rest, &question.lengths)?;
     // the task comes first: what follows differs from call to call
     let task = text.split_once(",\"count\"").map_or(text, |(task, _)| task);
     Some(Ok((question, task, arrays)))

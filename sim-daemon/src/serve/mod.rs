@@ -1,6 +1,7 @@
 //! `tightloop serve`: a daemon from start to end, its loop, and the threads beside it.
 
 mod device_memory;
+mod exchange;
 mod fault_log;
 mod groups;
 mod ik;
@@ -8,8 +9,10 @@ mod janitor;
 mod least_memory;
 mod log;
 mod pace;
+mod rollout;
 mod server;
 mod session;
+mod shown;
 mod watchdog;
 
 pub(crate) use session::{read_scene, run};

@@ -1,12 +1,9 @@
 //! The loop of a daemon: one command in, one frame out.
 
-use std::ptr::NonNull;
-use std::sync::Arc;
 use std::time::Instant;
 
-use sim_engine::backend::HostPages;
 use sim_engine::simulation::Simulation;
-use sim_protocol::host::{FrameMemory, Host, Next, Pages, Worlds};
+use sim_protocol::host::{Host, Next};
 use sim_protocol::{Op, RefusalKind};
 
 use crate::error::DaemonError;
@@ -16,6 +13,8 @@ use crate::serve::device_memory;
 use crate::serve::fault_log::FaultLog;
 use crate::serve::ik::Ik;
 use crate::serve::log::Log;
+use crate::serve::rollout::Rollouts;
+use crate::serve::shown::Shown;
 
 #[cfg(test)]
 mod tests;
@@ -40,6 +39,7 @@ fn serve(
 ) -> Result<(), DaemonError> {
     let mut mask = Vec::with_capacity(simulation.worlds());
     let (mut scratch, mut ik) = (Vec::new(), Ik::default());
+    let mut rollouts = Rollouts::default();
     let mut lease = 0;
     let mut is_reported = false;
     let watched = host.description().watch_worlds;
@@ -55,6 +55,9 @@ fn serve(
                 let started = Instant::now();
                 let mut applied = match lost(simulation) {
                     Some(refusal) => Err(refusal),
+                    None if host.inbox().op() == Op::Rollout => {
+                        rollouts.answer(simulation, host, watched)
+                    }
                     None => apply(simulation, host, &mut mask, &mut ik),
                 };
                 // its file may be gone when the recording is replayed
@@ -71,7 +74,10 @@ fn serve(
                             advance,
                             watched,
                         };
-                        host.answer(started, &mut shown);
+                        match host.inbox().op() {
+                            Op::Rollout => host.answer(started, &mut rollouts.end(shown)),
+                            _ => host.answer(started, &mut shown),
+                        }
                     }
                     Err(refusal) => host.refuse(refusal.kind, &refusal.reason),
                 }
@@ -79,6 +85,7 @@ fn serve(
             }
             Next::Late => {
                 host.give_up();
+                rollouts.forget();
                 let started = Instant::now();
                 // a lost device has no worlds to advance; the next command gets the error
                 if lost(simulation).is_none() && apply(simulation, host, &mut mask, &mut ik).is_ok()
@@ -148,54 +155,6 @@ fn record_state(simulation: &Simulation, host: &mut Host, all: bool) {
     let state = simulation.snapshot();
     if simulation.lost().is_none() {
         host.record_state(&state, all);
-    }
-}
-
-/// The worlds, for a frame.
-struct Shown<'a> {
-    simulation: &'a mut Simulation,
-    advance: Advance,
-    /// Worlds that observers see.
-    watched: usize,
-}
-
-impl Worlds for Shown<'_> {
-    fn frame(&mut self, arena: &mut [u64], memory: Option<&FrameMemory>) -> bool {
-        if let Some(memory) = memory {
-            self.simulation
-                .import(arena, &|| Some(Arc::new(FramePages(memory.pages(arena)?))));
-            if let Some(sharing) = self.simulation.sharing() {
-                sharing.assign_slot(arena);
-            }
-        }
-        match self.advance {
-            Advance::Step => self.simulation.step(arena),
-            Advance::Forward => self.simulation.forward(arena),
-        }
-        self.simulation.lost().is_none()
-    }
-
-    fn on_device(&mut self) -> Option<(usize, u64)> {
-        self.simulation.sharing()?.slot_shown()
-    }
-
-    fn state(&mut self, to: &mut [u8]) -> bool {
-        self.simulation.snapshot_first(self.watched, to);
-        self.simulation.lost().is_none()
-    }
-}
-
-/// Pages that frames lie in.
-struct FramePages(Arc<Pages>);
-
-// SAFETY: a lease's own file is mapped for writing and by whole pages, as long as they are owned.
-unsafe impl HostPages for FramePages {
-    fn start(&self) -> NonNull<u8> {
-        self.0.start()
-    }
-
-    fn bytes(&self) -> usize {
-        self.0.bytes().next_multiple_of(4096) // no page is smaller
     }
 }
 

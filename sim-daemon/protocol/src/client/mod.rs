@@ -351,6 +351,20 @@ impl Client {
         self.run(&call, hook)
     }
 
+    /// Advances every world by the control frames that the file at `path` asks for, with its policy; what was collected takes its
+    /// place. Returns a frame of the end.
+    ///
+    /// # Errors
+    /// As [`Client::step`]; [`ProtocolError::CommandRefused`] where the daemon cannot read or write `path`, which must be
+    /// absolute, or cannot carry out what it asks. The worlds stay at the frame before the one that was refused.
+    pub fn rollout(&self, path: &str, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
+        let call = Call {
+            path: Some(path),
+            ..Call::new(Op::Rollout, &[], None)
+        };
+        self.run(&call, hook)
+    }
+
     pub(crate) fn run(&self, call: &Call<'_>, hook: Hook<'_>) -> Result<Frame, ProtocolError> {
         self.with_controller(hook, |controller, hook| controller.run(call, hook))
     }

@@ -1,7 +1,8 @@
-//! Steps that no client asked for: the worlds keep their pace though no command came.
+//! Steps that the daemon makes itself: no command came and the worlds keep their pace, or a command asks for several.
 
 use std::time::Instant;
 
+use super::inbox::Inbox;
 use super::journal::Occasion;
 use super::state::{State, header};
 use super::worlds::Worlds;
@@ -11,13 +12,26 @@ use crate::{CommandHeader, Op};
 impl State {
     /// Advances the worlds by the step in the inbox, which no client sent.
     pub(super) fn advance(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
+        self.make_frame(arena, worlds, false);
+    }
+
+    /// Advances the worlds by the step in the inbox, which a command asked for.
+    pub(super) fn carry_out(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
+        self.make_frame(arena, worlds, true);
+    }
+
+    /// `is_asked` where the frame is due for a client, and not late.
+    fn make_frame(&mut self, arena: &mut [u64], worlds: &mut impl Worlds, is_asked: bool) {
         let started = Instant::now();
         let is_good = worlds.frame(arena, None);
         self.frames += 1;
         self.observers.changed();
+        let busy_ns = started.elapsed().as_nanos() as u64;
+        if is_asked {
+            self.pacer.hold();
+        }
         let now = Instant::now();
-        let busy_ns = now.duration_since(started).as_nanos() as u64;
-        self.pacer.leave(now, busy_ns, false);
+        self.pacer.leave(now, busy_ns, is_asked);
         if is_good && self.observers.is_due() {
             let head = header(&self.description, &self.frame, self.frames);
             self.observers.show(now, head, &self.frame, arena, worlds);
@@ -29,6 +43,28 @@ impl State {
                 table: &self.frame,
             };
             self.journals.entry(&occasion, Some(arena));
+        }
+    }
+
+    /// Exchanges the inbox for another one, and keeps the command in it.
+    pub(super) fn put_aside(&mut self) {
+        let spare = self.aside.take();
+        let spare = spare.unwrap_or_else(|| Inbox::for_commands_of(&self.description));
+        self.aside = Some(std::mem::replace(&mut self.inbox, spare));
+    }
+
+    /// Puts a step into the inbox for the client whose command was put aside.
+    pub(super) fn put_step(&mut self, commands: &[Command<'_>]) -> Result<(), String> {
+        let asked = self.aside.as_ref().map(|inbox| *inbox.header());
+        let header = asked.unwrap_or_default();
+        self.inbox
+            .put(&self.description, header, Op::Step, commands)
+    }
+
+    /// Exchanges the inboxes again.
+    pub(super) fn take_back(&mut self) {
+        if let Some(inbox) = &mut self.aside {
+            std::mem::swap(inbox, &mut self.inbox);
         }
     }
 

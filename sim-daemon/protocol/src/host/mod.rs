@@ -43,7 +43,7 @@ use crate::transport::{self, Sleeper, handshake};
 use crate::waiting::affinity::CoreAffinity;
 use crate::waiting::clock;
 use crate::waiting::waiter::{Waiter, cores};
-use crate::{Description, Op, ProtocolError, RefusalKind, Table};
+use crate::{Command, Description, Op, ProtocolError, RefusalKind, Table};
 
 /// While commands come without a pause, control requests are looked at this often.
 const AROUND_PERIOD: Duration = Duration::from_millis(20);
@@ -129,6 +129,7 @@ impl Host {
             polled: Instant::now(),
             frames: 0,
             inbox,
+            aside: None,
             stop,
             affinity: CoreAffinity::new(),
             pacer,
@@ -256,6 +257,36 @@ impl Host {
     /// Advances the worlds by that step, and shows observers; `arena` has room for a frame.
     pub fn advance(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) {
         self.state.advance(arena, worlds);
+    }
+
+    /// Puts the command in [`Host::inbox`] aside, which asks for steps that the daemon makes itself by [`Host::put_step`]. It stays
+    /// there until [`Host::take_back`].
+    pub fn put_aside(&mut self) {
+        self.state.put_aside();
+    }
+
+    /// Puts a step into [`Host::inbox`], for the client whose command was put aside.
+    ///
+    /// # Errors
+    /// One sentence about what does not fit.
+    pub fn put_step(&mut self, commands: &[Command<'_>]) -> Result<(), String> {
+        self.state.put_step(commands)
+    }
+
+    /// Advances the worlds by that step, at the pace of the run, and shows observers; `arena` has room for a frame. False if nobody
+    /// waits for it any more.
+    pub fn carry_out(&mut self, arena: &mut [u64], worlds: &mut impl Worlds) -> bool {
+        self.state.pacer.receive();
+        if !self.approach() {
+            return false;
+        }
+        self.state.carry_out(arena, worlds);
+        self.state.polled.elapsed() < AROUND_PERIOD || self.is_waited_for()
+    }
+
+    /// Puts the command that was put aside into [`Host::inbox`] again.
+    pub fn take_back(&mut self) {
+        self.state.take_back();
     }
 
     /// The number of the present lease: its frames lie in memory of its own. 0 if there is none.

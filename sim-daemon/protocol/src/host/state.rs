@@ -53,6 +53,8 @@ pub(super) struct State {
     pub(super) polled: Instant,
     pub(super) frames: u64,
     pub(super) inbox: Inbox,
+    /// The other inbox while the daemon makes steps of its own for a command: that of the client's.
+    pub(super) aside: Option<Inbox>,
     pub(super) stop: Arc<AtomicBool>,
     pub(super) affinity: CoreAffinity,
     pub(super) pacer: Pacer,
@@ -228,7 +230,8 @@ impl State {
             self.observers
                 .show(Instant::now(), common, &self.frame, &sent[head..], worlds);
         }
-        if is_good && self.journals.are_read() {
+        // the steps of a rollout were recorded one by one
+        if is_good && self.journals.are_read() && self.inbox.op() != Op::Rollout {
             let occasion = Occasion {
                 description: &self.description,
                 inbox: &self.inbox,

@@ -99,11 +99,14 @@ pub enum Op {
     Restore = 6,
     /// Solve the inverse kinematics that a file asks for, write the answer into it, evaluate the fields.
     Ik = 7,
+    /// Advance every world by several control frames with the policy that a file asks for, write what was collected into it,
+    /// show the last one.
+    Rollout = 8,
 }
 
 impl Op {
     /// All, in the order of their numbers, which begin with 1.
-    pub const ALL: [Op; 7] = [
+    pub const ALL: [Op; 8] = [
         Op::Step,
         Op::Reset,
         Op::Write,
@@ -111,6 +114,7 @@ impl Op {
         Op::Snapshot,
         Op::Restore,
         Op::Ik,
+        Op::Rollout,
     ];
 
     /// The inverse of `op as u32`.

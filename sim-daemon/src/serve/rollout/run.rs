@@ -1,0 +1,263 @@
+//! Carries out a rollout, frame by frame.
+
+use std::path::Path;
+
+use sim_engine::simulation::{Precision, Simulation};
+use sim_physics::arrays::status;
+use sim_policy::Runner;
+use sim_protocol::host::{FrameMemory, Host, Worlds};
+use sim_protocol::{RefusalKind, Table};
+
+use super::answer::Answer;
+use super::commands::Commands;
+use super::memory::Memory;
+use super::observation::{Observation, Real};
+use super::question::Asked;
+use crate::export::refusal::{Refusal, refusal};
+use crate::export::{self, Advance, snapshot};
+use crate::serve::exchange::Exchange;
+use crate::serve::shown::Shown;
+
+/// Memory that rollouts use again.
+#[derive(Default)]
+pub(crate) struct Rollouts {
+    /// The last frame.
+    arena: Vec<u64>,
+    /// Lease and number of the command that left it, as long as nothing else has moved the worlds.
+    left: Option<(u64, u64)>,
+    mask: Vec<bool>,
+}
+
+impl Rollouts {
+    /// Carries out the rollout that the file of the command asks for, and writes the answer into it.
+    pub(crate) fn answer(
+        &mut self,
+        simulation: &mut Simulation,
+        host: &mut Host,
+        watched: usize,
+    ) -> Result<Advance, Refusal> {
+        let left = self.left.take();
+        let advance = export::apply(simulation, host.inbox(), &mut self.mask)?;
+        let path = snapshot::path(host.inbox())?.to_owned();
+        let in_file = |problem: String| refused(&format!("{}: {problem}", path.display()));
+        let exchange = Exchange::read(Path::new(&path), 4).map_err(in_file)?;
+        let asked = Asked::parse(&exchange, simulation.worlds());
+        let asked = asked.map_err(|problem| refused(&problem))?;
+        let (epoch, seq) = (host.inbox().header().epoch, host.inbox().header().seq);
+        // a rollout comes in pieces: an evaluation between them might reset faulted worlds
+        let goes_on = asked.question.first > 0 && left == Some((epoch, seq.wrapping_sub(1)));
+        if !goes_on {
+            self.arena.resize(simulation.layout().bytes.div_ceil(8), 0);
+            // the policy sees the present state, which no frame may have shown
+            simulation.forward(&mut self.arena);
+        }
+        let bytes = match simulation.precision() {
+            Precision::F32 => self.run::<f32>(&asked, simulation, host, watched)?,
+            Precision::F64 => self.run::<f64>(&asked, simulation, host, watched)?,
+        };
+        exchange.answer(&bytes).map_err(in_file)?;
+        self.left = Some((epoch, seq));
+        Ok(advance)
+    }
+
+    /// The worlds at the end of a rollout: its last frame, not another evaluation.
+    pub(crate) fn end<'a>(&'a self, shown: Shown<'a>) -> End<'a> {
+        End {
+            arena: &self.arena,
+            shown,
+        }
+    }
+
+    /// The worlds move without a rollout.
+    pub(crate) fn forget(&mut self) {
+        self.left = None;
+    }
+
+    fn run<R: Real>(
+        &mut self,
+        asked: &Asked,
+        simulation: &mut Simulation,
+        host: &mut Host,
+        watched: usize,
+    ) -> Result<Vec<u8>, Refusal> {
+        let refuse = |problem: String| refused(&problem);
+        let (worlds, threads) = (simulation.worlds(), simulation.threads());
+        let table = export::frame_table(simulation.layout());
+        let mut observation = Observation::<R>::find(asked, &table).map_err(refuse)?;
+        let commands = Commands::find(asked, host.description()).map_err(refuse)?;
+        let actions = asked.network.outputs();
+        let left = asked.memory.clone();
+        let terms = &asked.question.terms;
+        let memory = Memory::new(terms, observation.sizes(), actions, worlds, left);
+        let mut memory = memory.map_err(refuse)?;
+        let answer = Answer::new(asked, worlds, &table, snapshot::check_room).map_err(refuse)?;
+        let mut rollout = Rollout {
+            asked,
+            table: &table,
+            observation: &mut observation,
+            commands,
+            memory: &mut memory,
+            answer,
+            runner: Runner::new(&asked.network),
+            observations: vec![0.0; worlds * asked.network.inputs()],
+            actions: vec![0.0; worlds * actions],
+            threads,
+            watched,
+        };
+        host.put_aside();
+        let frames = asked.question.frames;
+        let result = (0..frames).try_for_each(|frame| {
+            let step = rollout.step(frame, simulation, host, &mut self.arena, &mut self.mask);
+            step.map_err(|mut refusal| {
+                let frame = asked.question.first + frame;
+                refusal.reason = format!("rollout: frame {frame}: {}", refusal.reason);
+                refusal
+            })
+        });
+        host.take_back();
+        result?;
+        Ok(rollout.answer.finish(memory.values()))
+    }
+}
+
+/// The end of a rollout, for the client.
+pub(crate) struct End<'a> {
+    arena: &'a [u64],
+    shown: Shown<'a>,
+}
+
+impl Worlds for End<'_> {
+    fn frame(&mut self, arena: &mut [u64], _: Option<&FrameMemory>) -> bool {
+        let words = arena.len().min(self.arena.len());
+        arena[..words].copy_from_slice(&self.arena[..words]);
+        self.shown.simulation.lost().is_none()
+    }
+
+    fn state(&mut self, to: &mut [u8]) -> bool {
+        self.shown.state(to)
+    }
+}
+
+/// A rollout on its way.
+struct Rollout<'a, R> {
+    asked: &'a Asked,
+    table: &'a Table,
+    observation: &'a mut Observation<R>,
+    commands: Commands,
+    memory: &'a mut Memory,
+    answer: Answer,
+    runner: Runner,
+    /// `(worlds, inputs)` of the network.
+    observations: Vec<f32>,
+    /// `(worlds, outputs)` of the network, within bounds.
+    actions: Vec<f32>,
+    threads: usize,
+    watched: usize,
+}
+
+impl<R: Real> Rollout<'_, R> {
+    /// One control frame.
+    fn step(
+        &mut self,
+        frame: usize,
+        simulation: &mut Simulation,
+        host: &mut Host,
+        arena: &mut [u64],
+        mask: &mut Vec<bool>,
+    ) -> Result<(), Refusal> {
+        self.observe(frame, arena);
+        let run = self
+            .runner
+            .run(&self.observations, &mut self.actions, self.threads);
+        run.map_err(|error| problem_of(error.to_string()))?;
+        self.act();
+        self.commands.set(self.asked, &self.actions, frame);
+        host.put_step(&self.commands.all()).map_err(problem_of)?;
+        export::apply(simulation, host.inbox(), mask)?;
+        if let Some(sharing) = simulation.sharing() {
+            sharing.stage_shared(&[]);
+        }
+        let before = self.episodes(arena);
+        let mut shown = Shown {
+            simulation,
+            advance: Advance::Step,
+            watched: self.watched,
+        };
+        let is_waited_for = host.carry_out(arena, &mut shown);
+        if let Some(lost) = simulation.lost() {
+            return Err(refusal(RefusalKind::Backend, lost.to_string()));
+        }
+        if !is_waited_for {
+            let reason = "the client has gone, or the daemon ends".to_owned();
+            return Err(refusal(RefusalKind::Stale, reason));
+        }
+        self.answer
+            .collect(self.asked, frame, arena, &self.actions, &self.observations);
+        // worlds that were reset have a new episode, and the policy with them
+        let now = self.episodes(arena);
+        for (world, (before, now)) in before.into_iter().zip(now).enumerate() {
+            if now.steps < before.steps || before.is_frozen && !now.is_frozen {
+                self.memory.world(world).clear();
+            }
+        }
+        Ok(())
+    }
+
+    fn observe(&mut self, frame: usize, arena: &[u64]) {
+        let arena: &[R] = bytemuck::cast_slice(arena);
+        let width = self.asked.network.inputs();
+        for (world, row) in self.observations.chunks_exact_mut(width).enumerate() {
+            self.observation
+                .write(self.asked, self.memory, arena, (frame, world), row);
+        }
+    }
+
+    /// Brings actions within their bounds, and remembers them.
+    fn act(&mut self) {
+        let width = self.asked.network.outputs();
+        for (world, row) in self.actions.chunks_exact_mut(width).enumerate() {
+            if let Some([low, high]) = &self.asked.question.clip {
+                for ((value, &low), &high) in row.iter_mut().zip(low).zip(high) {
+                    *value = value.clamp(low, high);
+                }
+            }
+            let mut kept = self.memory.world(world);
+            let last = kept.last_action().iter_mut();
+            last.zip(row)
+                .for_each(|(last, value)| *last = f64::from(*value));
+        }
+    }
+
+    fn episodes(&self, arena: &[u64]) -> Vec<Episode> {
+        let bytes: &[u8] = bytemuck::cast_slice(arena);
+        let counter = |name: &str| {
+            let row = self.table.row(name).expect("every frame has it");
+            &bytes[row.offset - Table::head_bytes(self.table.rows().len())..][..row.bytes]
+        };
+        let steps: &[u64] = bytemuck::cast_slice(counter("step"));
+        let faults: &[u32] = bytemuck::cast_slice(counter("status"));
+        let episodes = steps.iter().zip(faults);
+        episodes
+            .map(|(&steps, &faults)| Episode {
+                steps,
+                is_frozen: faults & status::FROZEN != 0,
+            })
+            .collect()
+    }
+}
+
+/// Where a world is in its episode.
+struct Episode {
+    /// Control frames since the reset.
+    steps: u64,
+    is_frozen: bool,
+}
+
+/// What is wrong with a frame, whose number is added later.
+fn problem_of(reason: String) -> Refusal {
+    refusal(RefusalKind::Backend, reason)
+}
+
+fn refused(problem: &str) -> Refusal {
+    refusal(RefusalKind::Backend, format!("rollout: {problem}"))
+}
