@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from tightloop.planning.ik_objectives import Posture, Reach
     from tightloop.planning.inverse_kinematics import IkResult, IkSolver, ik
     from tightloop.planning.linearization import Linearization, linearize
+    from tightloop.planning.policies import Policy
+    from tightloop.planning.policy_terms import Drive
     from tightloop.planning.rollouts import Rollout
     from tightloop.scene.body import Body
     from tightloop.scene.distributions import Normal, Uniform
@@ -107,6 +109,8 @@ _HOMES = {
     "tightloop.planning.ik_objectives": ("Posture", "Reach"),
     "tightloop.planning.inverse_kinematics": ("IkResult", "IkSolver", "ik"),
     "tightloop.planning.linearization": ("Linearization", "linearize"),
+    "tightloop.planning.policies": ("Policy",),
+    "tightloop.planning.policy_terms": ("Drive",),
     "tightloop.planning.rollouts": ("Rollout",),
     "tightloop.scene.body": ("Body",),
     "tightloop.scene.distributions": ("Normal", "Uniform"),
@@ -133,6 +137,7 @@ __all__ = [
     "ContactSensor",
     "DaemonLost",
     "DaemonRestarted",
+    "Drive",
     "Dynamics",
     "Frame",
     "FrameCopy",
@@ -150,6 +155,7 @@ __all__ = [
     "MissingLibrary",
     "Normal",
     "OutputError",
+    "Policy",
     "Posture",
     "ProtocolMismatch",
     "RayHits",

@@ -56,6 +56,16 @@ class Commands:
             self._arrays[field] = np.tile(start, (self._worlds, 1))
         return self._arrays[field]
 
+    def followers(self, field: str, dofs: Sequence[int]) -> list[tuple[str, str, float, float]]:
+        """Return the mimic joints that follow dofs of a control: name, leader, multiplier and offset."""
+        if field != "joint_target_q":
+            return []
+        return [
+            (self._names[own], self._names[leader], multiplier, offset)
+            for own, leader, multiplier, offset in self._followers
+            if leader in dofs and own not in dofs
+        ]
+
     def begin(self, mask: NDArray[np.bool_]) -> None:
         """Reset the commands of worlds that begin an episode."""
         for field, array in self._arrays.items():

@@ -7,6 +7,7 @@ the commands.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +19,7 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.env.commands import Commands
 from tightloop.env.names import Names
 from tightloop.errors import ArgumentError
+from tightloop.planning.policy_terms import Drive
 
 
 class Control(Protocol):
@@ -30,7 +32,8 @@ class Control(Protocol):
     limit: float
     #: Frame fields that it reads.
     fields: tuple[str, ...]
-    # A control may have `value_names`, `scales` and `offsets`, for the metadata of policies: an entry per value.
+    # A control may have `value_names`, `scales` and `offsets`, for the metadata of policies: an entry per value. It may
+    # also have `drive`, which a rollout with a policy inside uses: what it does, or None where that takes more.
 
     def bind(self, names: Names, commands: Commands) -> None:
         """Look up names, and get the commands that it writes."""
@@ -82,6 +85,17 @@ class _Joints:
         self._own = np.empty((0 if self._side_by_side else len(self._array), self._count), np.float32)
         self._start = np.ascontiguousarray(commands.start[places])
         self._low, self._high = (np.ascontiguousarray(end) for end in commands.range[places].T)
+        self._followers = commands.followers(self._field, places)
+
+    @property
+    def drive(self) -> Drive | None:
+        """What the control does, for policies outside an environment; None for changes of a target."""
+        if not self._is_absolute or self.size != self._count:
+            return None
+        drive = Drive(command=self._field, of=self._dofs, scale=self._scale, offset=self._start)
+        if np.isfinite(self._low).any() or np.isfinite(self._high).any():
+            drive = replace(drive, low=self._low, high=self._high)
+        return replace(drive, followers=self._followers) if self._followers else drive
 
     @property
     def value_names(self) -> list[str]:
@@ -132,6 +146,11 @@ class JointTorque(_Joints):
         super().bind(names, commands)
         self._start = np.zeros_like(self._start)
         self._low, self._high = np.full_like(self._start, -np.inf), np.full_like(self._start, np.inf)
+
+    @property
+    def drive(self) -> Drive | None:
+        """What the control does; None if it adds the ``bias_force`` of the frame."""
+        return None if self._hold else super().drive
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the torques."""
@@ -210,6 +229,11 @@ class ActuatorControl:
         self._array = commands.array("ctrl", range(self.size))
         self.value_names = names.actuator_names
 
+    @property
+    def drive(self) -> Drive:
+        """What the control does, for policies outside an environment."""
+        return Drive(command="ctrl", of=self.value_names)
+
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the controls."""
         np.copyto(self._array, action)
@@ -247,6 +271,11 @@ class ActuatorTarget:
             )
         self._array = commands.array("ctrl", range(self.size))
         self.value_names = names.actuator_names
+
+    @property
+    def drive(self) -> Drive:
+        """What the control does, for policies outside an environment."""
+        return Drive(command="ctrl", of=self.value_names, scale=self._scale, offset=self._start)
 
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Write the controls."""

@@ -19,10 +19,12 @@ from tightloop.env.commands import Commands
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, name_of
-from tightloop.env.task import Task, observed_parts
+from tightloop.env.task import Observed, Task, observed_parts
 from tightloop.env.task_checks import scene_of
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
+from tightloop.planning.policies import DRIVES, TERMS
+from tightloop.planning.policy_terms import to_text
 
 
 def policy_metadata(envs: VectorEnv) -> dict[str, str]:
@@ -71,9 +73,16 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "action_low": space.low,
         "action_high": space.high,
     }
-    facts |= _joints(scene, names, alone)
+    facts |= _joints(scene, names, alone) | _for_rollouts(parts, controls)
     facts |= task.policy_metadata()
     return {name: _text(f"{type(task).__name__}.policy_metadata: {name}", value) for name, value in facts.items()}
+
+
+def _for_rollouts(parts: Sequence[Observed], controls: Sequence[Control]) -> dict[str, str]:
+    """Return what `Sim.rollout` needs to run the policy in the daemon, as far as the task says it."""
+    terms, drives = [part.term for part in parts], [getattr(control, "drive", None) for control in controls]
+    known = {TERMS: terms, DRIVES: drives}
+    return {key: to_text([part for part in own if part]) for key, own in known.items() if None not in own}
 
 
 def _joints(scene: tl.Scene, names: Names, alone: str) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -20,6 +20,7 @@ from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
 from tightloop.env.task_members import tell_of_class
 from tightloop.errors import ArgumentError, UnknownAttribute
+from tightloop.planning.policy_terms import Term
 from tightloop.scene.scene import Scene
 
 #: An array of NumPy, torch or JAX.
@@ -105,6 +106,8 @@ class Observed:
         unit: Unit of the values.
         history: Steps that the observation holds of this part, the oldest first: the current one and those before it.
             An episode begins with copies of its first values.
+        source: Where the values come from in a frame, for rollouts with a policy inside (`Sim.rollout`): a term of
+            `tightloop.planning.policy_terms`. The metadata of policies has the terms if all parts have one.
     """
 
     name: str
@@ -113,6 +116,7 @@ class Observed:
     size: int = 1
     unit: str = "–"
     history: int = 1
+    source: Term | None = None
     bounds: NDArray[np.float32] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -132,7 +136,18 @@ class Observed:
             ) from None
         if not (low < high).all():
             raise ArgumentError(f"observation `{self.name}`: low {self.low} must be below high {self.high}")
+        if self.source is not None and not isinstance(self.source, Term):
+            cure = "give a term of tightloop.planning.policy_terms"
+            raise ArgumentError(f"observation `{self.name}`: source is {self.source!r:.80}; {cure}")
         object.__setattr__(self, "bounds", np.stack([low, high]))
+
+    @property
+    def term(self) -> Term | None:
+        """The source with the bounds and history of this part; None if it has no source."""
+        if self.source is None:
+            return None
+        low, high = (float(str(end[0])) if (end == end[0]).all() else end for end in self.bounds)
+        return replace(self.source, low=low, high=high, history=self.history)
 
     @property
     def width(self) -> int:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop._core import Frame
-from tightloop.arrays.frames import FAULTED, unknown_field
+from tightloop.arrays.frames import FAULTED, FrameCopy, unknown_field
 from tightloop.arrays.inputs import real_numbers, switches
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError, CommandRefused, TightloopError
+from tightloop.planning.policy_rollouts import PolicyArguments, PolicyRun, count_of
 from tightloop.sim.command_rows import COMMANDS
 
 #: Fields of every frame, which are not collected unless they are asked for.
@@ -29,6 +30,8 @@ class Rollout:
         status: Status bits of each frame, as `Frame.status`, uint32, ``(frames, worlds)``.
         cost: Sum of the costs over the frames, float64, ``(worlds,)``; ``inf`` for worlds that faulted. None without a
             cost function.
+        memory: What the policy keeps from frame to frame, ``(worlds, values)``, for a rollout that continues this one.
+            None without a policy.
 
     Raises:
         UnknownField: The field was not collected.
@@ -40,6 +43,7 @@ class Rollout:
         self.fields = tuple(arrays)
         self.frames: int = len(status)
         self.cost: NDArray[np.float64] | None = np.zeros(status.shape[1]) if has_cost else None
+        self.memory: NDArray[np.float64] | None = None
 
     @property
     def faulted(self) -> NDArray[np.bool_]:
@@ -68,6 +72,7 @@ class Run:
         fields: Fields to collect, or None.
         cost: Cost function, or None.
         out: Rollout to write again, or None.
+        asked: Policy, number of frames, inputs and memory, each of which may be None.
 
     Raises:
         ArgumentError: An argument is not valid, or ``out`` does not fit.
@@ -77,16 +82,28 @@ class Run:
     def __init__(
         self,
         sim: Any,
-        commands: Mapping[str, Any],
+        commands: Mapping[str, Any] | None,
         fields: Sequence[str] | None,
-        cost: Callable[[Frame], NDArray[Any]] | None,
+        cost: Callable[..., NDArray[Any]] | None,
         out: Rollout | None,
+        *,
+        asked: PolicyArguments,
     ) -> None:
         if cost is not None and not callable(cost):
             raise ArgumentError(f"rollout: cost is {cost!r:.80}; give a function of a frame, which returns (worlds,)")
         self._sim, self._cost = sim, cost
-        self._commands, frames = _sequences(commands)
-        made = _shapes(sim, _chosen(sim, fields, cost is not None), frames)
+        self._policy: PolicyRun | None = None
+        extra: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
+        if asked.policy is None:
+            asked.refuse_others()
+            self._commands, frames = _sequences(commands)
+        else:
+            self._commands, lengths = ({}, []) if commands is None else _checked(commands)
+            frames = count_of(asked.frames, lengths)
+            self._policy = PolicyRun(sim, frames, self._commands, asked)
+            extra = self._policy.shapes()
+        fields, extra = _without_extra(fields, extra)
+        made = _shapes(sim, _chosen(sim, fields, cost is not None), frames) | extra
         if out is None:
             arrays = {name: np.empty(shape, dtype) for name, (shape, dtype) in made.items()}
             status = np.empty((frames, sim.worlds), np.uint32)
@@ -103,6 +120,8 @@ class Run:
         sim, out = self._sim, self._out
         if out.cost is not None:
             out.cost[:] = 0.0
+        if self._policy is not None:
+            return self._with_policy(self._policy)
         in_flight, index, last = False, 0, None
         try:
             for index in range(out.frames):
@@ -126,11 +145,22 @@ class Run:
             out.cost[out.faulted] = np.inf
         return out
 
+    def _with_policy(self, policy: PolicyRun) -> Rollout:
+        out = self._out
+        out.memory = policy.go({**out._arrays, "status": out.status}, None if out.cost is None else self._add_cost)
+        if out.cost is not None:
+            out.cost[out.faulted] = np.inf
+        return out
+
     def _take(self, frame: Frame, index: int) -> None:
         out = self._out
         out.status[index] = frame.status
         for name, array in out._arrays.items():
             array[index] = getattr(frame, name)
+        self._add_cost(frame)
+
+    def _add_cost(self, frame: Frame | FrameCopy) -> None:
+        out = self._out
         if self._cost is not None and out.cost is not None:
             given = np.asarray(self._cost(frame))
             if given.shape != out.cost.shape or given.dtype.kind not in "fiu":
@@ -145,8 +175,22 @@ def _finish(sim: Any) -> None:
         sim.recv()
 
 
+def _without_extra(fields: Any, extra: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """Return the fields without what only a policy has, and of that what is asked for."""
+    if not isinstance(fields, Sequence) or isinstance(fields, str):
+        return fields, {}
+    asked = {name: shape for name, shape in extra.items() if name in fields}
+    return [name for name in fields if not (isinstance(name, str) and name in asked)], asked
+
+
 def _sequences(commands: Any) -> tuple[dict[str, Any], int]:
     """Return the commands as arrays, with the frames first, and the number of frames."""
+    ready, lengths = _checked(commands)
+    return ready, lengths[0]
+
+
+def _checked(commands: Any) -> tuple[dict[str, Any], list[int]]:
+    """Return the commands as arrays, with the frames first, and their number of frames, once."""
     if not isinstance(commands, Mapping) or not commands:
         cure = 'give a dict by command, such as {"joint_f": array of shape (frames, worlds, dofs)}'
         found = "empty" if isinstance(commands, Mapping) else type(commands).__name__
@@ -162,7 +206,7 @@ def _sequences(commands: Any) -> tuple[dict[str, Any], int]:
     frames = next(iter(lengths.values()))
     if frames == 0:
         raise ArgumentError("rollout: commands have 0 frames; give at least one")
-    return ready, frames
+    return ready, [frames]
 
 
 def _ready(command: str, what: str, value: Any, lengths: dict[str, int]) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from tightloop import _core
 from tightloop.arrays.inputs import as_array, real_numbers, switches
-from tightloop.arrays.named_columns import named_columns
+from tightloop.arrays.named_columns import Runs, named_columns
 from tightloop.errors import CommandRefused
 from tightloop.sim.command_rows import COMMANDS
 
@@ -50,16 +50,25 @@ def commanded(sim: Any, call: Callable[..., Any], given: dict[str, Any]) -> Any:
 
 
 def _converted(sim: Any, name: str, value: Any) -> _core.Columns:
+    return _core.Columns(columns_of(sim, name, value))
+
+
+def columns_of(sim: Any, name: str, value: Any) -> Runs:
+    """Return a command as runs of neighbouring columns: the first of them, and an array ``(worlds, columns)``.
+
+    Raises:
+        CommandRefused: A shape or dtype is wrong, or no model of the scene has the name.
+    """
     row = COMMANDS.get(name)
     if row is not None and row.is_param:  # varies only where the run names it, which `Params` knows
-        return _core.Columns(sim.params.ready_columns(name, value))
+        return sim.params.ready_columns(name, value)
     layout = sim._client.layout(name)
     if layout is None:
         raise CommandRefused(f"{name}: no model of this scene has any; leave it out")
     names, columns, parts, robots = layout
     if isinstance(value, Mapping) and robots is not None:
         mimics = [(own["name"], own["leader"], own["multiplier"], own["offset"]) for own in sim.info["followers"]]
-        return _core.Columns(named_columns(name, value, sim.worlds, names, robots, followers=mimics, parts=parts))
+        return named_columns(name, value, sim.worlds, names, robots, followers=mimics, parts=parts)
     if row is not None and row.is_switch:
         value = switches(name, value)
     if parts > 1:  # the entries of all bodies in a row
@@ -67,4 +76,4 @@ def _converted(sim: Any, name: str, value: Any) -> _core.Columns:
         if value.shape[-2:] == (columns // parts, parts):
             value = value.reshape(*value.shape[:-2], columns)
     sizes = [(robot, stop - start, base) for robot, start, stop, base in robots or ()]
-    return _core.Columns([(0, as_array(name, None, value, sim.worlds, columns, robots=sizes))])
+    return [(0, as_array(name, None, value, sim.worlds, columns, robots=sizes))]

@@ -30,6 +30,8 @@ from tightloop.planning.dynamics import Dynamics
 from tightloop.planning.ik_objectives import Posture, Reach
 from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.planning.inverse_kinematics import IkSolver
+from tightloop.planning.policies import Policy
+from tightloop.planning.policy_rollouts import PolicyArguments
 from tightloop.planning.rollouts import Rollout
 from tightloop.scene.sensors import slices_by_name
 from tightloop.sim.command_arrays import Command, called, commanded
@@ -437,14 +439,21 @@ class Sim(Attributes):
 
     def rollout(
         self,
-        commands: Mapping[str, Any],
+        commands: Mapping[str, Any] | None = None,
         fields: Sequence[str] | None = None,
         *,
+        policy: Policy | str | os.PathLike[str] | None = None,
+        frames: int | None = None,
+        inputs: Mapping[str, ArrayLike] | None = None,
+        memory: ArrayLike | None = None,
         start: Sim | Snapshot | Frame | FrameCopy | tuple[Any, int] | None = None,
-        cost: Callable[[Frame], NDArray[Any]] | None = None,
+        cost: Callable[[Any], NDArray[Any]] | None = None,
         out: Rollout | None = None,
     ) -> Rollout:
-        """Step through a sequence of commands per world, and collect fields or a cost.
+        """Step through a sequence of commands per world or run a policy, and collect fields or a cost.
+
+        With a policy, the daemon evaluates it per world between control frames, and no frame waits for the client. It
+        sees the frame before, as a client does.
 
         Each world runs its own sequence. Fields of a frame are copied, and its cost is computed, while the worlds
         already do the next step. The worlds stay at the end of the rollout. Commands that are left out keep their last
@@ -452,13 +461,21 @@ class Sim(Attributes):
 
         Args:
             commands: Sequence of each command of `step`, by its name: an array ``(frames, worlds, columns)``, or
-                ``(frames, columns)`` for identical commands, or a dict of such by robot, joint or pattern.
-            fields: Fields to collect; those of the launch if left out, or none if there is a ``cost``.
+                ``(frames, columns)`` for identical commands, or a dict of such by robot, joint or pattern. With a
+                policy they may be left out. Those of columns that the policy drives are added to its commands.
+            fields: Fields to collect; those of the launch if left out, or none if there is a ``cost``. With a policy,
+                also ``"action"``, within its bounds, and ``"observation"``, float32 ``(frames, worlds, values)``.
+            policy: A `Policy`, or the path of its ONNX file if that says what the policy sees and drives.
+            frames: Number of frames of a policy; that of the commands if left out.
+            inputs: Values that the policy sees, by the name of its `Input` terms: ``(values,)`` for all, ``(frames,
+                values)``, or ``(frames or 1, worlds, values)``.
+            memory: `Rollout.memory` of the rollout before, if the policy continues it: last action, phase, history.
             start: What all worlds start from: a simulation or an observer's frame, whose world 0 counts, ``(source,
                 world)`` for another world, or a `Snapshot`. A snapshot with one world counts for all worlds here. If
                 left out, the worlds continue.
             cost: Function of a frame that returns the cost of each world, ``(worlds,)``. Its sum over the frames is
-                `Rollout.cost`. The function must not call this simulation, and must not keep the frame.
+                `Rollout.cost`. With a policy it gets copies of frames, after they were computed. The function must not
+                call this simulation, and must not keep the frame.
             out: A rollout with the same worlds, frames and fields, whose arrays are written again. A loop that gives
                 the last result allocates no array.
 
@@ -468,10 +485,12 @@ class Sim(Attributes):
         Raises:
             ArgumentError: An argument is not valid, or ``out`` does not fit.
             UnknownField: Frames of this run do not carry the field.
-            CommandRefused: A command is not valid; the message names the frame. The worlds stay at the frame before.
+            CommandRefused: A command is not valid, of the caller or the policy; the message names the frame. The worlds
+                stay at the frame before.
             SnapshotError: ``start`` does not fit; no world changed. Other errors are those of `copy_from` and `step`.
         """
-        run = rollouts.Run(self, commands, fields, cost, out)
+        asked = PolicyArguments(policy, frames, inputs, memory)
+        run = rollouts.Run(self, commands, fields, cost, out, asked=asked)
         if start is not None:
             plans.begin_rollout(self, start)
         return run.go()

@@ -27,6 +27,7 @@ import tightloop as tl
 from tightloop.assets import CARTPOLE
 from tightloop.env.controls import Control, JointTorque
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.planning.policy_terms import Values
 
 URDF = CARTPOLE
 TRACK = 2.4  # [m]
@@ -54,12 +55,13 @@ class CartPoleBalance(Task):
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
+        slide, hinge = "cart/slide", "cart/hinge"
         return [
-            Observed("position of the cart", -3, 3, unit="m"),
-            Observed("sine of the angle", -1, 1),
-            Observed("cosine of the angle", -1, 1),
-            Observed("velocity of the cart", -20, 20, unit="m/s"),
-            Observed("angular velocity of the pole", -50, 50, unit="rad/s"),
+            Observed("position of the cart", -3, 3, unit="m", source=Values("joint_q", of=slide)),
+            Observed("sine of the angle", -1, 1, source=Values("joint_q", of=hinge, function="sin")),
+            Observed("cosine of the angle", -1, 1, source=Values("joint_q", of=hinge, function="cos")),
+            Observed("velocity of the cart", -20, 20, unit="m/s", source=Values("joint_qd", of=slide)),
+            Observed("angular velocity of the pole", -50, 50, unit="rad/s", source=Values("joint_qd", of=hinge)),
         ]
 
     def observe(self, xp: Namespace, worlds: Worlds) -> Sequence[Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import tightloop as tl
@@ -10,6 +11,7 @@ from tightloop.checks.arguments import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
 from tightloop.env.task import Observed
 from tightloop.errors import ArgumentError
+from tightloop.planning.policy_terms import Values
 from tightloop.scene.shapes import ORIGIN, Surface
 
 if TYPE_CHECKING:
@@ -82,10 +84,16 @@ def gripper(*, binary: bool = False) -> Gripper:
     return Gripper(FINGERS, low=-0.01, high=0.04, binary=binary)
 
 
-def joints_observed() -> list[Observed]:
-    """Return the observed positions and velocities of the nine joints."""
+def joints_observed(start: Sequence[float] | None = None) -> list[Observed]:
+    """Return the observed positions and velocities of the nine joints.
+
+    Args:
+        start: Positions that are subtracted [rad, m]; None where the task says nothing of its sources.
+    """
     reach = [6.0] * 7 + [0.1] * 2
+    turned = None if start is None else Values("joint_q", of="arm", minus=start)
+    moving = None if start is None else Values("joint_qd", of="arm")
     return [
-        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m"),
-        Observed("joint velocities", -10, 10, 9, "rad/s, m/s"),
+        Observed("joint positions", [-end for end in reach], reach, 9, "rad, m", source=turned),
+        Observed("joint velocities", -10, 10, 9, "rad/s, m/s", source=moving),
     ]

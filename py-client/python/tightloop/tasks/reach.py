@@ -30,6 +30,7 @@ import tightloop as tl
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.planning.policy_terms import Input, LastAction
 from tightloop.tasks import franka
 from tightloop.tasks.geometry import angle, distance, in_box, squares
 
@@ -65,11 +66,12 @@ class FrankaReach(Task):
 
     def observed(self) -> Sequence[Observed]:
         """The table above."""
+        limit = self._arm_control.limit
         return [
-            *franka.joints_observed(),
-            Observed("goal: position", LOW, HIGH, 3, "m"),
-            Observed("goal: orientation", -1, 1, 4),
-            Observed("last action", -self._arm_control.limit, self._arm_control.limit, self._arm_control.size),
+            *franka.joints_observed(START),
+            Observed("goal: position", LOW, HIGH, 3, "m", source=Input("goal: position", 3)),
+            Observed("goal: orientation", -1, 1, 4, source=Input("goal: orientation", 4)),
+            Observed("last action", -limit, limit, self._arm_control.size, source=LastAction()),
         ]
 
     def bind(self, names: Names) -> None:

@@ -23,6 +23,7 @@ from tightloop.env.mirror import Flip, Mirror
 from tightloop.env.names import Names
 from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
 from tightloop.errors import ArgumentError
+from tightloop.planning.policy_terms import Clock, Gravity, Input, LastAction, Values
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
 from tightloop.tasks.legged import LeggedModel, LeggedRobot, RobotOptions
@@ -143,16 +144,18 @@ class VelocityTask(Task):
 
     def observed(self) -> Sequence[Observed]:
         """The table of the module."""
-        joints = len(self.robot.joints)
+        joints, base, dofs = len(self.robot.joints), self.robot.name, self.robot.dofs
+        velocity, turning = (Values("joint_qd", of=base, columns=range(n, n + 3), axes_of=base) for n in (0, 3))
+        turned = Values("joint_q", of=dofs, minus=self.robot.standing)
         return [
-            Observed("velocity", -10, 10, 3, "m/s"),
-            Observed("angular velocity", -30, 30, 3, "rad/s"),
-            Observed("gravity", -1, 1, 3),
-            Observed("command", -2, 2, 3, "m/s, rad/s"),
-            Observed("joint positions", -4, 4, joints, "rad"),
-            Observed("joint velocities", -60, 60, joints, "rad/s"),
-            Observed("last action", -LIMIT, LIMIT, joints),
-            Observed("phase", -1, 1, 2),
+            Observed("velocity", -10, 10, 3, "m/s", source=velocity),
+            Observed("angular velocity", -30, 30, 3, "rad/s", source=turning),
+            Observed("gravity", -1, 1, 3, source=Gravity(base)),
+            Observed("command", -2, 2, 3, "m/s, rad/s", source=Input("command", 3)),
+            Observed("joint positions", -4, 4, joints, "rad", source=turned),
+            Observed("joint velocities", -60, 60, joints, "rad/s", source=Values("joint_qd", of=dofs)),
+            Observed("last action", -LIMIT, LIMIT, joints, source=LastAction()),
+            Observed("phase", -1, 1, 2, source=Clock(self.gait, runs_with="command")),
         ]
 
     def bind(self, names: Names) -> None:
