@@ -29,7 +29,7 @@ pub const DOORS: [(&str, &str); 24] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 50] = [
+pub const UNSAFE: [&str; 51] = [
     "py-client/src/frame.rs",                              // NumPy views
     "py-client/src/xla/abi.rs", // structs and arrays of XLA's foreign functions
     "sim-core/compile/src/lib.rs", // runs machine code

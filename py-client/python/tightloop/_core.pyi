@@ -485,9 +485,7 @@ def xla_function(function: Any, name: str, /) -> int:
         name: What it is, for messages.
     """
 
-def xla_call(
-    call: str, inputs: str, fields: str, operands: list[NDArray[Any]], outputs: list[NDArray[Any]], /
-) -> None:
+def xla_call(call: str, inputs: str, fields: str, operands: list[NDArray[Any]], outputs: list[NDArray[Any]], /) -> None:
     """Make the call of a program of XLA with arrays of NumPy.
 
     Args:

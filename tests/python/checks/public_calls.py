@@ -244,7 +244,32 @@ CALLS: dict[str, Call] = {
         lambda world: world.sim.rollout,
         {},
         {},
-        dict.fromkeys(("commands", "fields", "start", "cost", "out"), "forms of its own: test_rollout.py tries them"),
+        {
+            name: "forms of its own: test_rollout.py tries them"
+            for name in ("commands", "fields", "start", "cost", "out")
+        }
+        | {
+            name: "forms of its own: test_policy_rollout.py tries them"
+            for name in ("policy", "frames", "inputs", "memory")
+        },
+    ),
+    "Policy": Call(
+        lambda _: tl.Policy,
+        {},
+        {},
+        {
+            name: "forms of its own: test_policy_rollout.py tries them"
+            for name in ("path", "observe", "act", "clip", "output")
+        },
+    ),
+    "Drive": Call(
+        lambda _: tl.Drive,
+        {},
+        {},
+        {
+            name: "forms of its own: test_policy_rollout.py tries them"
+            for name in ("command", "of", "scale", "offset", "low", "high", "values", "followers")
+        },
     ),
     "ik": Call(
         lambda _: tl.ik,

@@ -79,6 +79,7 @@ ENV_CALLS: dict[str, Call] = {
             "history": "count",
         },
         {"name": "angle", "low": -1.0, "high": 1.0},
+        {"source": "terms, which planning/test_policy_rollout.py tries"},
     ),
     "Push": Call(
         lambda _: env.Push,
