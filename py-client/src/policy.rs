@@ -92,8 +92,8 @@ impl PolicyNetwork {
     }
 }
 
-/// Bytes of a file in a folder.
-fn beside(folder: &Path, name: &str, offset: u64, length: Option<u64>) -> Result<Vec<u8>, String> {
+/// Bytes of a file in a folder; a link may not lead out of it.
+fn beside(folder: &Path, name: &str, offset: u64, length: u64) -> Result<Vec<u8>, String> {
     let path = folder.join(name);
     let failed = |problem: std::io::Error| {
         format!(
@@ -101,20 +101,32 @@ fn beside(folder: &Path, name: &str, offset: u64, length: Option<u64>) -> Result
             path.display()
         )
     };
-    let mut file = File::open(&path).map_err(failed)?;
-    let status = file.metadata().map_err(failed)?;
-    if !status.is_file() {
-        return Err(format!("lies in {}, which is no file", path.display()));
+    let folder = folder.canonicalize().map_err(failed)?;
+    let canonical = path.canonicalize().map_err(failed)?;
+    if !canonical.starts_with(folder) {
+        return Err(format!(
+            "lies in {}, which leads to {}; put the file itself beside the ONNX file",
+            path.display(),
+            canonical.display()
+        ));
     }
-    file.seek(SeekFrom::Start(offset)).map_err(failed)?;
-    let there = status.len().saturating_sub(offset);
-    let length = length.unwrap_or(there);
+    // looked at before it is opened: a pipe would be waited for
+    if !canonical.symlink_metadata().map_err(failed)?.is_file() {
+        return Err(format!(
+            "lies in {}, which is not a file; put its weights there",
+            path.display()
+        ));
+    }
+    let mut file = File::open(&canonical).map_err(failed)?;
+    let there = file.metadata().map_err(failed)?.len();
+    let there = there.saturating_sub(offset);
     if length > there || length > FILE_MAX {
         return Err(format!(
             "lies in {}, of which it needs {length} bytes from {offset} on, and there are {there}; export the policy anew",
             path.display()
         ));
     }
+    file.seek(SeekFrom::Start(offset)).map_err(failed)?;
     let mut bytes = Vec::with_capacity(length as usize);
     file.take(length).read_to_end(&mut bytes).map_err(failed)?;
     Ok(bytes)

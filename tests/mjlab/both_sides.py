@@ -24,18 +24,32 @@ Array = NDArray[Any]
 #: Both classes of simulations; nothing calls `install` in this process.
 Theirs, Ours = Simulation, TightloopSimulation
 
+#: Parts of names of events that draw fields of the model for all worlds together.
+OF_THE_MODEL = ("friction", "base_com")
 #: Seed of the environments, and of their first reset.
 SEED = 3
 #: Frames of the motion, at 50 frames per second.
 _FRAMES = 75
 
 
-def environment(task: str, simulation: type[Any], worlds: int = 8, *, motion: Path | None = None) -> Any:
-    """Make an environment of a registered task, with all its randomization, with a class of simulations."""
+def environment(
+    task: str,
+    simulation: type[Any],
+    worlds: int = 8,
+    *,
+    motion: Path | None = None,
+    left_out: tuple[str, ...] = (),
+) -> Any:
+    """Make an environment of a registered task with a class of simulations.
+
+    Events whose names contain a part of ``left_out`` are removed.
+    """
     cfg = load_env_cfg(task)
     cfg.scene.num_envs, cfg.seed = worlds, SEED
     # mjlab's 10 iterations are few now and then, and each solver then stops elsewhere
     cfg.sim.mujoco.iterations, cfg.sim.mujoco.ls_iterations = 100, 50
+    for name in [name for name in cfg.events if any(part in name for part in left_out)]:
+        cfg.events.pop(name)
     if "motion" in cfg.commands:
         assert motion is not None
         cfg.commands["motion"].motion_file = str(motion)

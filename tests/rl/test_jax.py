@@ -119,6 +119,27 @@ def test_seeds_of_a_reset_are_those_of_sim_reset(sim):
     assert np.array_equal(frame.joint_q, expected.joint_q) and np.array_equal(frame.joint_qd, expected.joint_qd)
 
 
+@pytest.mark.parametrize("x64", [False, True])
+def test_seeds_are_whole_numbers_below_2_to_the_32_or_a_key(sim, x64):
+    made = JaxSim(sim)
+    reset = jax.jit(lambda token, seed: made.reset(token, seed=seed))
+    with jax.enable_x64(x64):
+        for wrong in (-1, 2**32, 2**70, np.int64(2**32), np.array([0, 1, 2, 3, 2**32]), 1.5, True, [1, 2], jnp.ones(5)):
+            with pytest.raises(
+                tl.CommandRefused, match=r"seed is .*; give a key of jax\.random, or whole numbers from 0"
+            ):
+                made.reset(made.token(), seed=wrong)
+        _, frame = made.reset(made.token(), seed=2**32 - 1)
+        assert np.array_equal(frame.joint_q, sim.reset(seed=2**32 - 1).joint_q)
+        for key in (jax.random.key(3), jax.random.PRNGKey(3)):
+            drawn = np.asarray(jax.random.bits(key, (WORLDS,), np.uint32))
+            expected = sim.reset(seed=drawn).joint_q.copy()
+            for call in (made.reset, reset):
+                assert np.array_equal(call(made.token(), seed=key)[1].joint_q, expected)
+        with pytest.raises(tl.CommandRefused, match=r"seed is of key<fry> and shape \(5,\)"):
+            made.reset(made.token(), seed=jax.random.split(jax.random.key(0), WORLDS))
+
+
 def test_double_precision_has_the_bits_of_a_python_loop_and_needs_x64():
     given = forces(200).astype(np.float64) / 3
     with launch(precision="f64") as sim:
@@ -234,8 +255,9 @@ def test_closing_the_simulation_ends_a_program(via):
     thread.start()
     assert f"SimClosed: simulation `{sim.name}` was closed" in failed(lambda: program(made.token()))
     thread.join()
-    with pytest.raises(tl.SimClosed):
-        made.token()
+    for call in (made.token, lambda: JaxSim(sim)):
+        with pytest.raises(tl.SimClosed):
+            call()
 
 
 def test_a_compiled_program_whose_simulation_was_dropped_is_an_error():
@@ -313,6 +335,7 @@ def test_commands_and_masks_that_do_not_fit_are_refused_by_name(sim):
         ({"joint_f": {"cart/slide": 1.0}}, r"joint_f is a dict; in JAX give an array in the order of the names"),
         ({"joint_f": jnp.ones((5, 2), bool)}, "dtype bool is not a real number"),
         ({"joint_f": "left"}, "joint_f is 'left'"),
+        ({"joint_f": [[1.0, 2.0], [3.0]]}, r"joint_f is \[\[1.0, 2.0\], \[3.0\]\]; give an array of real numbers"),
         ({"ctrl": jnp.ones(1)}, "ctrl: no model of this scene has any; leave it out"),
     ):
         with pytest.raises(tl.CommandRefused, match=said):
@@ -320,8 +343,8 @@ def test_commands_and_masks_that_do_not_fit_are_refused_by_name(sim):
     for mask in (jnp.ones(5), jnp.ones(4, bool)):
         with pytest.raises(tl.CommandRefused, match=r"mask: got .* bool, shape \(5,\)"):
             made.reset(made.token(), mask=mask)
-    with pytest.raises(tl.CommandRefused, match="seed: got float32"):
-        made.reset(made.token(), seed=1.5)
+    with pytest.raises(tl.ConstantParameter, match=r'name it at launch: params=\("body_f",\)'):
+        jax.jit(lambda push: made.step(made.token(), body_f=push))(jnp.zeros((len(sim.body_names), 6)))
     with pytest.raises(tl.UnknownField, match="body_qd"):
         JaxSim(sim, ("body_qd",))
     with pytest.raises(tl.SignatureError, match="joint_targets"):

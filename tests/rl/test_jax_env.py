@@ -18,7 +18,7 @@ import pytest
 from jax import lax
 
 import tightloop as tl
-from tightloop.adapters.jax import JaxEnv, programs
+from tightloop.adapters.jax import JaxEnv, JaxSim, programs
 from tightloop.env import VectorEnv
 
 STEPS, WORLDS = 80, 6
@@ -85,7 +85,8 @@ def test_a_reset_by_key_is_part_of_a_program_and_repeats_its_episodes(made, hast
     # behind a step of the same program
     both = jax.jit(lambda state: env.reset(2, env.step(env.reset(1)[0], given[0])[0]))
     assert np.array_equal(both(state)[1], env.reset(2)[1])
-    for wrong in (-1, 2**32, 1.5, True, None, jnp.arange(3)):
+    keys = jax.random.split(jax.random.key(0), 3)
+    for wrong in (-1, 2**32, 2**70, np.array(2**32), 1.5, True, None, jnp.arange(3), keys):
         with pytest.raises(tl.ArgumentError, match=r"seed is .*; give a"):
             env.reset(wrong)
     assert np.array_equal(env.reset(2**32 - 1)[1], env.reset(2**32 - 1)[1])
@@ -109,6 +110,8 @@ def test_errors_of_an_environment_have_their_names(made, hasty, via):
     env.step(after, action)
     with pytest.raises(tl.ArgumentError, match=r"action: expected real numbers of shape \(6, 1\); got .* \(6, 2\)"):
         env.step(after, jnp.zeros((WORLDS, 2)))
+    with pytest.raises(tl.ArgumentError, match=r"action: expected real numbers.*got complex64"):
+        env.step(after, action + 1j)
     with pytest.raises(tl.ArgumentError, match="token is"):
         env.step(None, action)
     with pytest.raises(tl.ArgumentError, match=r"tightloop\.linearize"):
@@ -120,6 +123,28 @@ def test_errors_of_an_environment_have_their_names(made, hasty, via):
     state, _ = env.reset(1)
     os.kill(env.env.sim.pid, signal.SIGKILL)
     assert "DaemonLost: daemon" in failed(lambda: env.step(state, action))
+
+
+@WAYS
+def test_a_token_of_something_else_is_an_error_before_a_step(made, hasty, via):
+    env, twin, smaller = (made(JaxEnv(hasty, worlds, threads=1, via=via)) for worlds in (WORLDS, WORLDS, 2))
+    action, sim = jnp.zeros((WORLDS, 1)), env.env.sim
+    (state, _), (others, _), (small, _) = (one.reset(1) for one in (env, twin, smaller))
+    for given in (JaxSim(sim, via=via).step, JaxSim(sim, via=via).reset):
+        said = failed(lambda given=given: given(state))
+        assert "ArgumentError: this token is of the environment of Hasty; the program was made for a JaxSim" in said
+    said = failed(lambda: env.step(small, action))
+    assert "this token is of the environment of Hasty (action [2, 1]" in said
+    assert "the program was made for the environment of Hasty (action [6, 1]" in said
+    # of a simulation
+    before = sim.forward().step.tolist()
+    said = failed(lambda: env.step(JaxSim(sim).token(), action))
+    assert f"ArgumentError: this token is of simulation `{sim.name}`; the program was made for the step of" in said
+    assert sim.forward().step.tolist() == before
+    # all were refused before they counted; and a twin runs with its own token
+    env.step(state, action)
+    env.step(others, action)
+    smaller.step(small, jnp.zeros((2, 1)))
 
 
 def test_an_error_of_a_task_is_one_of_the_program(made, hasty):

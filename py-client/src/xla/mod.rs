@@ -191,7 +191,8 @@ fn put(
 fn used(name: &str, turn: u32, calls: u32) -> Failure {
     let problem = format!(
         "the token of call {turn} of {name} was used before: the worlds are at call {calls}, and cannot go back. Give each call \
-         what the last one returned, or begin with `token()` of a JaxSim or `reset` of a JaxEnv. Run the program on one device"
+         what the last one returned, or begin with `token()` of a JaxSim or `reset` of a JaxEnv; a `reset` after \
+         steps in the same program takes `state`. Run the program on one device"
     );
     precondition("CommandRefused", problem)
 }

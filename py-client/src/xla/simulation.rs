@@ -106,6 +106,14 @@ impl Simulation {
             "reset" => client.reset_to(&commands, mask, seeds.as_deref(), hook),
             "write" => client.write(&commands, mask, hook),
             "forward" => client.forward(hook),
+            // those of environments name what they are of
+            other if other.contains(" of ") => {
+                let problem = format!(
+                    "this token is of {}; the program was made for the {other}",
+                    self.name()
+                );
+                return Err(precondition("ArgumentError", problem));
+            }
             other => return Err(internal(format!("there is no call `{other}`"))),
         };
         made.map_err(|error| match is_closed() {

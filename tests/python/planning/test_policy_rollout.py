@@ -175,6 +175,30 @@ def test_commands_of_the_caller_are_added_to_those_of_the_policy(arm):
         assert np.array_equal(by_name.joint_q, alone.joint_q)
 
 
+def test_a_mimic_joint_follows_its_leader_with_what_the_caller_adds(tmp_path):
+    text = '<robot name="m"><link name="base"/>'
+    for name, mimic in (("lead", ""), ("follow", '<mimic joint="lead" multiplier="-1" offset="0.2"/>')):
+        text += f"""<link name="{name}_link"><inertial><mass value="1"/>
+            <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+            <joint name="{name}" type="revolute"><parent link="base"/><child link="{name}_link"/><axis xyz="0 0 1"/>
+            <limit lower="-2" upper="2" effort="10" velocity="10"/>{mimic}</joint>"""
+    (tmp_path / "m.urdf").write_text(text + "</robot>")
+    scene = tl.Scene(gravity=(0, 0, 0))
+    scene.add_urdf(tmp_path / "m.urdf")
+    still = onnx_files.write(tmp_path / "still.onnx", [onnx_files.linear([[0.0]], [0.25])], 1)
+    followers = [("m/follow", "m/lead", -1.0, 0.2)]
+    act = tl.Drive(command="joint_target_q", of="m/lead", followers=followers)
+    policy = tl.Policy(still, observe=[LastAction()], act=act)
+    fields = ("joint_target_q",)
+    with tl.launch(scene, worlds=2, precision="f64", fields=fields) as sim:
+        for noise, lead in ((0.0, 0.25), (0.3, 0.55)):
+            by_name = {"joint_target_q": {"m/lead": np.full((3, 2), noise)}}
+            by_column = {"joint_target_q": np.full((3, 2, 2), noise)}
+            for commands in (by_name, by_column):
+                targets = sim.rollout(commands, policy=policy, fields=fields).joint_target_q
+                np.testing.assert_allclose(targets, np.broadcast_to([lead, 0.2 - lead], (3, 2, 2)), atol=1e-6)
+
+
 def test_costs_and_arrays_are_those_of_other_rollouts(arm):
     scene, policy = arm
     goal = {"goal": (0.3, -0.2)}
@@ -234,6 +258,29 @@ def test_a_world_that_is_reset_has_a_policy_that_begins_anew(pendulum, tmp_path)
     assert (rollout.step[frames + 1, worlds] == 1).all()
     assert (rollout.observation[frames + 2, worlds] == 0.0).all()
     assert (rollout.observation[frames + 1, worlds, 1] == 1.0).all()
+
+
+def test_a_world_that_is_reset_between_two_rollouts_begins_anew_as_within_one(pendulum, tmp_path):
+    path = onnx_files.write(tmp_path / "push.onnx", [onnx_files.linear([[0.0, 0.1]], [1.0])], 2)
+    act = tl.Drive(command="joint_f", of="arm/elbow", scale=40.0)
+    policy = tl.Policy(path, observe=[LastAction(history=2)], act=act)
+    fields = ("observation", "joint_q", "step")
+    with tl.launch(pendulum, worlds=2, fields=("joint_q",), bounds={"joint_qd": 20.0}, on_fault="reset") as sim:
+        start, memory = sim.snapshot(), None
+        whole = sim.rollout(policy=policy, frames=24, fields=fields)
+        assert whole.faulted.all()
+        sim.restore(start)
+        for frame in range(24):
+            one = sim.rollout(policy=policy, frames=1, fields=fields, memory=memory)
+            memory = one.memory
+            for name in fields:
+                assert np.array_equal(getattr(one, name)[0], getattr(whole, name)[frame]), (name, frame)
+        sim.restore(start)
+        bad = sim.rollout(policy=policy, frames=1 + int(np.argmax(whole.status[:, 0] != 0)), fields=fields)
+        assert (bad.status[-1] != 0).all()
+        sim.forward()  # which resets them
+        anew = sim.rollout(policy=policy, frames=1, fields=fields, memory=bad.memory)
+        assert (anew.observation == 0.0).all() and (anew.step == 1).all()
 
 
 def test_a_recording_of_it_replays_without_the_policy(arm, tmp_path):
@@ -300,6 +347,12 @@ def test_a_client_that_dies_meanwhile_leaves_a_daemon_that_serves(arm, tmp_path,
             "frames is 5, and the commands have 4",
         ),
         ({"frames": 5, "policy": None, "commands": None}, tl.ArgumentError, "frames belongs to a policy"),
+        ({"policy": None, "commands": "policy.onnx"}, tl.ArgumentError, "give it as policy="),
+        (
+            {"frames": 5, "memory": np.full((9, 2), np.nan)},
+            tl.ArgumentError,
+            "memory of world 0 has NaN .* set its row",
+        ),
         ({"policy": 3, "frames": 5}, tl.ArgumentError, "path is 3"),
         ({"policy": "nowhere.onnx", "frames": 5}, tl.ArgumentError, r"nowhere\.onnx: cannot be read"),
     ],
@@ -344,6 +397,15 @@ def test_policies_that_cannot_run_are_refused_with_the_reason(arm, tmp_path):
         (tl.Policy(bare, observe=[Gravity("arm")], act=drive), "does not float; give one of its links"),
         (tl.Policy(bare, observe=[both], act=tl.Drive(command="joint_g")), "there is no command 'joint_g'"),
         (tl.Policy(bare, observe=[both], act=[drive, tl.Drive(command="joint_target_q")]), "drives value 3"),
+        (tl.Policy(bare, observe=[both], act=tl.Drive(command="joint_f", of=[])), "has no columns; name joints"),
+        (
+            tl.Policy(
+                bare,
+                observe=[both],
+                act=tl.Drive(command="joint_f", of="elbow", followers=[("elbow", "shoulder", 1.0, 0.0)]),
+            ),
+            "'shoulder' leads, and is not in `of`",
+        ),
         (tl.Policy(bare, observe=[Values("joint_q", minus=[1, 2, 3])], act=drive), "minus has 3 numbers"),
     ]
     with tl.launch(scene, worlds=2, fields=FIELDS) as sim:

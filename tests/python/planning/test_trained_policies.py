@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import onnx_files
 import pytest
 
 import tightloop as tl
 from conftest import REPOSITORY
+from tightloop.planning.policy_terms import Gravity, Values
 from tightloop.tasks.cartpole import CartPoleSwingUp
 from tightloop.tasks.humanoid import HumanoidVelocityFlat
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
@@ -136,3 +138,58 @@ def test_the_metadata_of_a_task_has_what_it_sees_and_drives(envs):
     # a control that reads the frame, and an observation that is more than columns
     assert "action_drives" not in policy_metadata(envs("FrankaReach", 1, control="torque"))
     assert "observation_terms" not in policy_metadata(envs("AntRun", 1))
+
+
+@pytest.mark.parametrize(
+    ("kind", "named", "match"),
+    [
+        (Values, {"field": "joint_q", "columns": 3}, "columns is 3; give a list of whole numbers"),
+        (Values, {"field": "joint_q", "columns": "ab"}, "columns is 'ab'"),
+        (Values, {"field": "joint_q", "columns": [0.5]}, r"columns is \[0\.5\]"),
+        (Values, {"field": "joint_q", "of": 5}, "of is 5; give a name"),
+        (Values, {"field": "joint_q", "scale": 1e39}, r"scale is 1e\+39; give numbers of single precision"),
+        (Gravity, {"of": ["a"]}, r"of is \['a'\]"),
+        (tl.Drive, {"command": "joint_f", "values": [1.5]}, r"values is \[1\.5\]"),
+        (tl.Drive, {"command": "joint_f", "followers": [("a", "b")]}, r"give \(name, leader, multiplier, offset"),
+        (tl.Drive, {"command": "joint_f", "followers": [("a", 5, 1.0, 0.0)]}, "follower or leader is 5"),
+    ],
+)
+def test_parts_that_mean_nothing_are_refused_by_name(kind, named, match):
+    with pytest.raises(tl.ArgumentError, match=match):
+        kind(**named)
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "match"),
+    [
+        ("action_drives", '[{"command":5}]', "metadata `action_drives`: Drive: command is 5"),
+        ("action_drives", "[" * 100000, "is nested too deeply"),
+        ("action_drives", '[{"command":"joint_f","of":' + "[" * 600 + "]" * 600 + "}]", "metadata `action_drives`"),
+        ("observation_terms", '[{"kind":"values"}]', "field.*policy_metadata"),
+    ],
+)
+def test_metadata_of_a_stranger_is_refused_by_name(tmp_path, key, text, match):
+    path = onnx_files.write(tmp_path / "p.onnx", [onnx_files.linear([[0.0]], [0.0])], 1, {key: text})
+    with pytest.raises(tl.ArgumentError, match=match):
+        tl.Policy(path)
+
+
+def test_names_in_a_file_are_no_regular_expressions(pendulum, tmp_path):
+    drive = '[{"command":"joint_f","of":"arm/elbow"}]'
+    with tl.launch(pendulum, worlds=1, fields=("joint_q",)) as sim:
+        for name, works in (
+            ("arm/elb*", True),
+            ("*/el*w", True),
+            ("arm/elb.w", False),
+            ("(a|a)*(r|m)*/(e|e)*$", False),
+        ):
+            metadata = {
+                "observation_terms": json.dumps([{"kind": "values", "field": "joint_q", "of": name}]),
+                "action_drives": drive,
+            }
+            path = onnx_files.write(tmp_path / "p.onnx", [onnx_files.linear([[0.0]], [0.0])], 1, metadata)
+            if works:
+                sim.rollout(policy=path, frames=1)
+                continue
+            with pytest.raises(tl.ArgumentError, match="in this scene"):
+                sim.rollout(policy=path, frames=1)

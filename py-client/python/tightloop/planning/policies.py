@@ -78,6 +78,8 @@ class Policy:
             raise ArgumentError(f"{self.path}: {problem}") from None
         self.inputs, self.actions = self._network.sizes
         self.metadata: dict[str, str] = dict(self._network.metadata)
+        #: Keys of the metadata that were read
+        self._read: set[str] = set()
         self.observe = self._parts("observe", observe, Term, TERMS, terms_of)
         self.act = self._parts("act", [act] if isinstance(act, Drive) else act, Drive, DRIVES, drives_of)
         self.clip = self._bounds(clip)
@@ -107,7 +109,10 @@ class Policy:
     def _parts(self, name: str, given: Any, kind: type[Any], key: str, read: Any) -> list[Any] | None:
         if given is None:
             text = self.metadata.get(key)
-            return None if text is None else read(f"{self.path}: metadata `{key}`", text)
+            if text is None:
+                return None
+            self._read.add(key)
+            return read(f"{self.path}: metadata `{key}`", text)
         if isinstance(given, str) or not isinstance(given, Sequence) or not all(isinstance(x, kind) for x in given):
             raise ArgumentError(f"Policy: {name} is {given!r:.80}; give a list of {kind.__name__}s")
         if not given:
@@ -127,7 +132,7 @@ class Policy:
             if bounds.ndim == 0:
                 bounds = np.stack([-bounds, bounds])
             bounds = np.broadcast_to(bounds if bounds.ndim == 2 else bounds[:, None], (2, self.actions))
-        except (TypeError, ValueError, IndexError):
+        except (TypeError, ValueError, IndexError, OverflowError):
             bounds = np.full((2, self.actions), np.nan, np.float32)
         if not (bounds[0] <= bounds[1]).all():
             raise ArgumentError(f"{what} is {given!r:.80}; give (low, high), each a number or {self.actions} of them")

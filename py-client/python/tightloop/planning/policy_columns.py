@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tightloop.arrays.frames import unknown_field
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError
-from tightloop.planning.policies import Policy
+from tightloop.planning.policies import DRIVES, TERMS, Policy
 from tightloop.planning.policy_terms import Clock, Drive, Gravity, Input, LastAction, Term, Values
 from tightloop.sim.command_rows import COMMANDS
 
@@ -47,6 +47,8 @@ class Columns:
         self._fields = {field["name"]: field for field in info["fields"]}
         self._robots = {robot["name"]: robot for robot in info["robots"]}
         self.inputs: dict[str, int] = {}
+        #: Whether names are those of a file, in which `*` alone stands for others.
+        self._is_of_file = False
 
     def terms(self) -> list[dict[str, Any]]:
         """Return the terms as the daemon takes them.
@@ -64,6 +66,7 @@ class Columns:
         for term in policy.observe:
             if isinstance(term, Input) and self.inputs.setdefault(term.name, term.width) != term.width:
                 raise ArgumentError(f"policy: input {term.name!r} has several widths; give one")
+        self._is_of_file = TERMS in policy._read
         made = [self._term(index, term) for index, term in enumerate(policy.observe)]
         size = sum(size * term.history for (size, _), term in zip(made, policy.observe, strict=True))
         if size != policy.inputs:
@@ -88,6 +91,7 @@ class Columns:
                 f"{policy.path} does not say what the action drives; give tl.Policy(path, act=[tl.Drive(…)]), or write "
                 "`action_drives` into its metadata (examples/policy_file.py --task TASK)"
             )
+        self._is_of_file = DRIVES in policy._read
         made, first = [], 0
         for drive in policy.act:
             plain = self._drive(drive, first)
@@ -147,6 +151,8 @@ class Columns:
             )
         columns = self._places(f"{what}: `{drive.command}`", row.axis, row.parts, drive.of)
         size = len(columns)
+        if not columns:
+            raise ArgumentError(f"{what}: `{drive.command}` has no columns; name joints, actuators or links in `of`")
         values = list(range(first, first + size)) if drive.values is None else [int(value) for value in drive.values]
         if len(values) != size or min(values, default=0) < 0:
             raise ArgumentError(f"{what}: values are {values}; give the value of the action of each of {size} columns")
@@ -155,9 +161,10 @@ class Columns:
             raise ArgumentError(f"{what}: low {drive.low} must not be above high {drive.high}")
         followers = []
         for name, leader, multiplier, offset in drive.followers:
-            (own,) = self._places(f"{what}: followers", row.axis, row.parts, name)
-            (lead,) = self._places(f"{what}: followers", row.axis, row.parts, leader)
-            followers.append((own, columns.index(lead), float(multiplier), float(offset)))
+            follower, lead = (self._place(f"{what}: followers", row.axis, row.parts, one) for one in (name, leader))
+            if lead not in columns:
+                raise ArgumentError(f"{what}: followers: {leader!r:.80} leads, and is not in `of`; name it there")
+            followers.append((follower, columns.index(lead), float(multiplier), float(offset)))
         return {
             "command": drive.command,
             "columns": columns,
@@ -213,6 +220,13 @@ class Columns:
         alone = len(self._robots) == 1 and "/" not in name
         return next(iter(self._robots.values())) if alone else None
 
+    def _place(self, what: str, axis: str, parts: int, name: str) -> int:
+        """The only column of a name."""
+        places = self._places(what, axis, parts, name)
+        if len(places) != 1:
+            raise ArgumentError(f"{what}: {name!r:.80} has {len(places)} columns; give the name of one joint")
+        return places[0]
+
     def _places(self, what: str, axis: str, parts: int, of: Any) -> list[int]:
         """Columns of what has these names, in their order."""
         if axis not in _NAMES:
@@ -248,9 +262,12 @@ class Columns:
         ends = [place for place, full in enumerate(names) if full.rpartition("/")[2] == own]
         if len(ends) == 1 and (not prefix or len(self._robots) == 1):
             return ends
+        if self._is_of_file:
+            # a pattern of a stranger may take for ever
+            return [place for place, full in enumerate(names) if _fits(name, full)] if "*" in name else []
         try:
             return [place for place, full in enumerate(names) if re.fullmatch(name, full)]
-        except re.error:
+        except (re.error, RecursionError, OverflowError):
             return []
 
 
@@ -260,6 +277,22 @@ def _each(what: str, value: Any, size: int) -> NDArray[np.float64]:
     if numbers.shape not in ((), (size,)):
         raise ArgumentError(f"{what} has {numbers.size} numbers; give one, or one for each of {size} values")
     return np.broadcast_to(numbers.astype(np.float32).astype(np.float64), (size,))
+
+
+def _fits(pattern: str, name: str) -> bool:
+    """Whether a name is the pattern, in which each ``*`` stands for any text; in time of their lengths."""
+    first, *parts = pattern.split("*")
+    last = parts.pop()
+    end = len(name) - len(last)
+    if not (name.startswith(first) and name.endswith(last)) or end < len(first):
+        return False
+    place = len(first)
+    for part in parts:
+        place = name.find(part, place, end)
+        if place < 0:
+            return False
+        place += len(part)
+    return True
 
 
 def _unless(default: float, numbers: NDArray[np.float64]) -> list[float]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tightloop.arrays.frames import FrameCopy
 from tightloop.arrays.inputs import reals
+from tightloop.arrays.named_columns import named_columns
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
 from tightloop.errors import ArgumentError, CommandRefused
@@ -100,11 +101,12 @@ class PolicyRun:
         shown = self._shown(arrays, cost is not None)
         per_frame = sum(int(np.prod(shape)) * dtype.itemsize for shape, dtype in shown.values())
         at_most = max(1, _BYTES // max(per_frame, 1))
-        first, piece = 0, _FIRST
+        first, piece, last = 0, _FIRST, None
         while first < self._frames:
             count = min(piece, at_most, self._frames - first)
             began = time.perf_counter()
             collected = self._ask(first, count, shown)
+            last = self._check_steps(first, last, collected["step"])
             took = time.perf_counter() - began
             for name, array in arrays.items():
                 array[first : first + count] = collected[name]
@@ -118,12 +120,24 @@ class PolicyRun:
     def _shown(self, arrays: Mapping[str, Any], has_cost: bool) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Shape and dtype of a frame of all that the daemon collects: fields first."""
         of_frame = {field["name"]: field for field in self._sim.info["fields"]}
-        names = [*of_frame] if has_cost else [name for name in arrays if name not in EXTRA]
+        # steps show whether frames passed between two pieces
+        chosen = [name for name in arrays if name not in EXTRA]
+        names = [*of_frame] if has_cost else [*dict.fromkeys([*chosen, "step"])]
         shown = {
             name: (tuple(of_frame[name]["shape"]), np.dtype(f"{of_frame[name]['dtype'][0]}{_bytes(of_frame[name])}"))
             for name in names
         }
         return shown | {name: (shape[1:], dtype) for name, (shape, dtype) in self.shapes().items() if name in arrays}
+
+    def _check_steps(self, first: int, last: Any, steps: NDArray[Any]) -> NDArray[np.int64]:
+        """Refuse frames between this piece and the one before; return the steps at its end."""
+        steps = steps.reshape(len(steps), -1).astype(np.int64)
+        if last is not None and (passed := int((steps[0] - last).max()) - 1) > 0:
+            raise CommandRefused(
+                f"rollout: frame {first}: {passed} control frames passed before it, without the policy; launch with "
+                'RealTime(late="pause"), or without real time'
+            )
+        return steps[-1]
 
     def _ask(
         self, first: int, count: int, shown: Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
@@ -165,15 +179,29 @@ class PolicyRun:
             runs: dict[int, list[NDArray[np.float64]]] = {}
             for frame in range(first, first + count):
                 try:
-                    columns = columns_of(self._sim, name, _at(value, frame))
+                    columns = self._columns_of(name, _at(value, frame))
                 except CommandRefused as problem:
                     raise CommandRefused(f"rollout: frame {frame}: {problem}") from None
-                for start, own in columns:
-                    if not np.isfinite(own).all():
+                for start, values in columns:
+                    if not np.isfinite(values).all():
                         raise CommandRefused(f"rollout: frame {frame}: {name} is not finite; give finite numbers")
-                    runs.setdefault(start, []).append(own)
-            made += [(name, start, np.stack(own)) for start, own in runs.items()]
+                    runs.setdefault(start, []).append(values)
+            made += [(name, start, np.stack(values)) for start, values in runs.items()]
         return made
+
+    def _columns_of(self, name: str, value: Any) -> list[tuple[int, NDArray[Any]]]:
+        """As `columns_of`, but a joint that the policy drives leads no other one: its value is only added."""
+        layout = self._sim._client.layout(name)
+        driven = {column for drive in self._plain["drives"] if drive["command"] == name for column in drive["columns"]}
+        if not driven or not isinstance(value, Mapping) or layout is None or layout[3] is None:
+            return columns_of(self._sim, name, value)
+        names, _, parts, robots = layout
+        mimics = [
+            (mimic["name"], mimic["leader"], mimic["multiplier"], mimic["offset"])
+            for mimic in self._sim.info["followers"]
+            if names.index(mimic["leader"]) not in driven
+        ]
+        return named_columns(name, value, self._sim.worlds, names, robots, followers=mimics, parts=parts)
 
 
 def _at(value: Any, index: int) -> Any:
@@ -237,6 +265,11 @@ def _memory(given: Any, worlds: int) -> NDArray[np.float64]:
     memory = reals("rollout: memory", given)
     if memory.ndim != 2 or len(memory) != worlds:
         raise ArgumentError(f"rollout: memory has shape {memory.shape}; give `memory` of a rollout of {worlds} worlds")
+    bad = np.flatnonzero(~np.isfinite(memory).all(axis=1))
+    if len(bad):
+        raise ArgumentError(
+            f"rollout: memory of world {bad[0]} has NaN or infinity; set its row to 0, and its policy begins anew"
+        )
     return memory.astype(np.float64)
 
 

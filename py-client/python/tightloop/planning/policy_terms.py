@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from numbers import Integral, Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +20,8 @@ from tightloop.checks.attributes import suggestion
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
 
+#: The largest number in single precision.
+_MOST = float(np.finfo(np.float32).max)
 #: Functions of values.
 FUNCTIONS = ("sin", "cos")
 
@@ -78,6 +81,11 @@ class Values(Term):
     def __post_init__(self) -> None:
         super().__post_init__()
         checks.text("Values: field", self.field, error=ArgumentError)
+        _names("Values: of", self.of)
+        if self.columns is not None:
+            _integers("Values: columns", self.columns)
+        if self.axes_of is not None:
+            checks.text("Values: axes_of", self.axes_of, error=ArgumentError)
         if self.function is not None and self.function not in FUNCTIONS:
             raise ArgumentError(
                 f"Values: function is {self.function!r:.80}; {suggestion(str(self.function), FUNCTIONS)}"
@@ -95,6 +103,10 @@ class Gravity(Term):
 
     kind: ClassVar[str] = "gravity"
     of: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.text("Gravity: of", self.of, error=ArgumentError)
 
 
 @checked_calls
@@ -142,6 +154,8 @@ class Clock(Term):
     def __post_init__(self) -> None:
         super().__post_init__()
         checks.number("Clock: hz", self.hz, error=ArgumentError)
+        if self.runs_with is not None:
+            checks.text("Clock: runs_with", self.runs_with, error=ArgumentError)
 
 
 @checked_calls
@@ -170,8 +184,23 @@ class Drive:
     followers: Sequence[tuple[str, str, float, float]] = ()
 
     def __post_init__(self) -> None:
+        checks.text("Drive: command", self.command, error=ArgumentError)
+        _names("Drive: of", self.of)
         for name in ("scale", "offset", "low", "high"):
             _numbers(f"Drive: {name}", getattr(self, name), finite=name in ("scale", "offset"))
+        if self.values is not None:
+            _integers("Drive: values", self.values)
+        if isinstance(self.followers, str) or not isinstance(self.followers, Sequence):
+            raise ArgumentError(f"Drive: followers is {self.followers!r:.80}; give (name, leader, multiplier, offset)s")
+        for follower in self.followers:
+            if isinstance(follower, str) or not isinstance(follower, Sequence) or len(follower) != 4:
+                raise ArgumentError(f"Drive: followers has {follower!r:.80}; give (name, leader, multiplier, offset)")
+            for name in follower[:2]:
+                checks.text("Drive: name of a follower or leader", name, error=ArgumentError)
+            for number in follower[2:]:
+                if not isinstance(number, Real):
+                    raise ArgumentError(f"Drive: followers has {follower!r:.80}; give numbers after the names")
+                _numbers("Drive: multiplier or offset of a follower", number, finite=True)
 
 
 KINDS: dict[str, type[Term]] = {kind.kind: kind for kind in (Values, Gravity, Input, LastAction, Clock)}
@@ -225,6 +254,8 @@ def _listed(value: Any) -> Any:
 def _entries(what: str, text: str) -> list[dict[str, Any]]:
     try:
         entries = json.loads(text)
+    except RecursionError:
+        raise ArgumentError(f"{what} is nested too deeply; write it by tightloop.env.policy_metadata") from None
     except ValueError as problem:
         raise ArgumentError(f"{what} is no JSON: {problem}; write it by tightloop.env.policy_metadata") from None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -243,15 +274,36 @@ def _made(what: str, kind: Any, entry: dict[str, Any]) -> Any:
 
     try:
         return kind(**{name: numbers(value) for name, value in entry.items()})
+    except RecursionError:
+        raise ArgumentError(f"{what} is nested too deeply; write it by tightloop.env.policy_metadata") from None
+    except ArgumentError as problem:
+        raise ArgumentError(f"{what}: {problem}") from None
     except TypeError as problem:
-        raise ArgumentError(f"{what} has {entry!r:.80}: {problem}") from None
+        cure = "write it by tightloop.env.policy_metadata"
+        raise ArgumentError(f"{what} has {entry!r:.80}: {problem}; {cure}") from None
 
 
 def _numbers(what: str, value: Any, *, finite: bool) -> NDArray[np.float64]:
     try:
         numbers = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.full((), np.nan)
+    if (np.isfinite(numbers) & (np.abs(numbers) > _MOST)).any():
+        raise ArgumentError(f"{what} is {value!r:.80}; give numbers of single precision, at most {_MOST:.4g}")
     if numbers.ndim > 1 or np.isnan(numbers).any() or (finite and np.isinf(numbers).any()):
         raise ArgumentError(f"{what} is {value!r:.80}; give a {'finite ' * finite}number, or one for each value")
     return numbers
+
+
+def _names(what: str, value: Any) -> None:
+    if value is None or isinstance(value, str):
+        return
+    if not isinstance(value, Sequence) or not all(isinstance(name, str) for name in value):
+        raise ArgumentError(f"{what} is {value!r:.80}; give a name, or a list of names")
+
+
+def _integers(what: str, value: Any) -> None:
+    entries = value.tolist() if isinstance(value, np.ndarray) else value
+    is_list = isinstance(entries, Sequence) and not isinstance(entries, str)
+    if not is_list or not all(isinstance(entry, Integral) and not isinstance(entry, bool) for entry in entries):
+        raise ArgumentError(f"{what} is {value!r:.80}; give a list of whole numbers")

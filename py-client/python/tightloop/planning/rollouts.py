@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -95,6 +96,8 @@ class Run:
         self._policy: PolicyRun | None = None
         extra: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
         if asked.policy is None:
+            if isinstance(commands, str | os.PathLike):
+                raise ArgumentError(f"rollout: commands is {os.fspath(commands)!r:.80}; give it as policy=")
             asked.refuse_others()
             self._commands, frames = _sequences(commands)
         else:

@@ -5,6 +5,7 @@ use crate::description::{Description, Robot, Sense};
 use crate::error::ModelError;
 use crate::model::RobotRange;
 use sim_physics::constants::params::Param;
+use sim_physics::constants::sensors::FramePart;
 
 /// Puts MuJoCo's inverse weights in the place of ours, for the robots that it compiled.
 pub(super) fn take_inverse_weights(
@@ -38,10 +39,12 @@ pub(super) fn sensors_of_centers(scene: &Description) -> Vec<String> {
         };
         for sensor in &parts.sensors.all {
             let moves = match &sensor.sense {
-                Some(Sense::Frame { of, from, .. }) => {
-                    of.is_inertial || from.is_some_and(|from| from.is_inertial)
+                // axes of inertia stay where they are
+                Some(Sense::Frame { part, of, from, .. }) => {
+                    let is_inertial = of.is_inertial || from.is_some_and(|from| from.is_inertial);
+                    is_inertial && matches!(part, FramePart::Position | FramePart::Velocity)
                 }
-                Some(Sense::Acceleration { of, .. }) => of.is_inertial,
+                Some(Sense::Acceleration { of, is_angular, .. }) => of.is_inertial && !is_angular,
                 _ => false,
             };
             if moves {

@@ -8,8 +8,10 @@ use super::message::{Graph, Node};
 use super::tensor::Tensor;
 use crate::{Layer, PolicyError};
 
-/// Values that computed constants of a file may have together.
-const CONSTANTS_MAX: usize = 1 << 28;
+/// Values that computed constants and layers of a file may have together, and the parameters of its policy.
+/// Tests have fewer, to take little memory.
+pub(super) const CONSTANTS_MAX: usize = if cfg!(test) { 1 << 20 } else { 1 << 28 };
+
 /// What a name of the graph stands for.
 enum Value<'a> {
     Constant(Cow<'a, Tensor>),
@@ -60,12 +62,15 @@ impl<'a> Chains<'a> {
             let constant = Value::Constant(Cow::Borrowed(tensor));
             chains.values.insert(name, constant);
         }
-        let mut computed = 0;
+        let (mut computed, mut counted) = (0, 0);
         for node in &graph.nodes {
             let value = chains.value(node).unwrap_or_else(Value::Broken);
             if let Value::Constant(tensor) = &value {
                 computed += tensor.values.len();
             }
+            let links = &chains.links[counted..];
+            computed += links.iter().map(|link| link.step.kept()).sum::<usize>();
+            counted = chains.links.len();
             if computed > CONSTANTS_MAX {
                 let problem =
                     format!("computes more than {CONSTANTS_MAX} constants; export the policy anew");
@@ -114,6 +119,7 @@ impl<'a> Chains<'a> {
         let port = &self.graph.inputs[*place];
         let sized = steps.iter().find_map(|step| match step {
             Step::Row(_, row) => Some(row.len()),
+            Step::Width(width) => Some(*width),
             Step::Linear(weights, _) => weights.matrix().map(|(_, inputs)| inputs),
             _ => None,
         });
@@ -132,8 +138,26 @@ impl<'a> Chains<'a> {
         }
         let (mut layers, mut parameters, mut size) = (Vec::new(), Vec::new(), inputs);
         for step in steps {
+            let more = match step {
+                Step::Linear(weights, _) => {
+                    weights.values.len() + weights.matrix().unwrap_or_default().0
+                }
+                Step::Single(..) => size,
+                other => other.kept(),
+            };
+            if more > CONSTANTS_MAX - parameters.len() {
+                return Err(graph_error(format!(
+                    "has more than {CONSTANTS_MAX} parameters; give a smaller policy"
+                )));
+            }
             let (layer, taken) = match step {
                 Step::Input(_) => continue,
+                Step::Width(width) if *width == size => continue,
+                Step::Width(width) => {
+                    return Err(graph_error(format!(
+                        "makes rows of {width} numbers of rows of {size}; give those of the same width"
+                    )));
+                }
                 Step::Layer(layer) => (*layer, size),
                 Step::Single(layer, value) => {
                     parameters.extend(std::iter::repeat_n(*value, size));
@@ -192,17 +216,18 @@ impl<'a> Chains<'a> {
             return Ok(Value::Constant(Cow::Owned(constant)));
         }
         let (mut link, mut other, mut constants) = (None, None, Vec::new());
-        for name in &node.inputs {
+        let mut chained = 0;
+        for (argument, name) in node.inputs.iter().enumerate() {
             match self.values.get(name.as_str()) {
                 _ if name.is_empty() => constants.push(None),
                 Some(Value::Constant(tensor)) => constants.push(Some(tensor.as_ref())),
                 Some(Value::Broken(error)) => return Err(error.clone()),
                 Some(Value::Link(place)) => {
                     constants.push(None);
-                    (link, other) = match link {
-                        None => (Some(*place), other),
-                        first => (first, Some(*place)),
-                    };
+                    match link {
+                        None => (link, chained) = (Some(*place), argument),
+                        Some(_) => other = Some(*place),
+                    }
                 }
                 None => {
                     let problem = format!(
@@ -222,7 +247,7 @@ impl<'a> Chains<'a> {
                 let (before, step) = self.gated(node, first, second)?;
                 return Ok(self.link(before, step));
             }
-            (Some(_), None) => steps(node, &constants)?,
+            (Some(_), None) => steps(node, chained, &constants)?,
         };
         let mut end = link;
         for step in steps {

@@ -16,16 +16,40 @@ pub(super) enum Step {
     Linear(Tensor, Vec<f32>),
     Row(Layer, Vec<f32>),
     Single(Layer, f32),
+    /// No layer, where rows have that many values.
+    Width(usize),
 }
 
-/// The layers of a node whose input of the chain is none of the constants.
-pub(super) fn steps(node: &Node, constants: &[Option<&Tensor>]) -> Result<Vec<Step>, PolicyError> {
+impl Step {
+    /// Values that it keeps.
+    pub(super) fn kept(&self) -> usize {
+        match self {
+            Step::Linear(weights, biases) => weights.values.len() + biases.len(),
+            Step::Row(_, row) => row.len(),
+            _ => 0,
+        }
+    }
+}
+
+/// The layers of a node whose argument `place` is the chain, which is none of the constants.
+pub(super) fn steps(
+    node: &Node,
+    place: usize,
+    constants: &[Option<&Tensor>],
+) -> Result<Vec<Step>, PolicyError> {
     let refuse = |problem: &str| Err(refused(node, problem));
     let constant = |place: usize| constants.get(place).copied().flatten();
     let float = |name, otherwise| node.float(name).unwrap_or(otherwise);
+    let is_set = |name| node.integer(name).is_some_and(|value| value != 0);
     let one = |layer| Ok(vec![Step::Layer(layer)]);
-    // whether the chain is the second argument
-    let is_second = constant(0).is_some();
+    let is_second = place == 1;
+    let takes_either = matches!(
+        &*node.operator,
+        "Add" | "Mul" | "Sub" | "Div" | "Max" | "Min"
+    );
+    if place > 1 || is_second && !takes_either {
+        return refuse("what depends on the input is not its first argument");
+    }
     let join = |layer| {
         let Some(tensor) = constant(usize::from(!is_second)) else {
             return refuse("it lacks an argument");
@@ -54,9 +78,14 @@ pub(super) fn steps(node: &Node, constants: &[Option<&Tensor>]) -> Result<Vec<St
         "Cast" if node.integer("to") == Some(1) => Ok(Vec::new()),
         "Flatten" if matches!(node.integer("axis"), None | Some(1 | -1)) => Ok(Vec::new()),
         "Reshape" => match constant(1).map(|shape| &shape.values[..]) {
-            // as many rows as before
-            Some([rows, _]) if matches!(*rows, 0.0 | -1.0) => Ok(Vec::new()),
-            _ => refuse("it changes the shape to other than rows"),
+            // 0 is an axis as before
+            Some([0.0, -1.0] | [0.0 | -1.0, 0.0]) if !is_set("allowzero") => Ok(Vec::new()),
+            Some(&[rows, width])
+                if width >= 1.0 && (rows == -1.0 || rows == 0.0 && !is_set("allowzero")) =>
+            {
+                Ok(vec![Step::Width(width as usize)])
+            }
+            _ => refuse("it changes the shape to other than rows; give it (-1, width)"),
         },
         "Gemm" | "MatMul" => linear(node, constants),
         "BatchNormalization" => batch_normalization(node, constants),
@@ -109,24 +138,17 @@ fn linear(node: &Node, constants: &[Option<&Tensor>]) -> Result<Vec<Step>, Polic
     let constant = |place: usize| constants.get(place).copied().flatten();
     let is_set = |name| node.integer(name).is_some_and(|value| value != 0);
     let is_gemm = node.operator == "Gemm";
-    if constant(0).is_some() || is_set("transA") {
-        return Err(refuse(
-            "the input of the chain is not its first factor, by rows",
-        ));
+    if is_set("transA") {
+        return Err(refuse("its first factor is transposed"));
     }
     let weights = constant(1).filter(|weights| weights.matrix().is_some());
     let weights = weights.ok_or_else(|| refuse("its weights are no constant matrix"))?;
-    let mut weights = match is_gemm && is_set("transB") {
-        true => weights.clone(),
-        false => weights.transposed().expect("it is a matrix"),
-    };
+    let by_outputs = is_gemm && is_set("transB");
+    let (rows, columns) = weights.matrix().unwrap_or_default();
+    let outputs = if by_outputs { rows } else { columns };
+    let [alpha, beta] = ["alpha", "beta"].map(|name| node.float(name).unwrap_or(1.0));
     let mut biases = Vec::new();
     if is_gemm {
-        let [alpha, beta] = ["alpha", "beta"].map(|name| node.float(name).unwrap_or(1.0));
-        weights
-            .values
-            .iter_mut()
-            .for_each(|weight| *weight *= alpha);
         if let Some(tensor) = constant(2) {
             let row = tensor.single().map(|value| vec![value]);
             let row = row.or_else(|| tensor.as_row().map(<[f32]>::to_vec));
@@ -134,10 +156,20 @@ fn linear(node: &Node, constants: &[Option<&Tensor>]) -> Result<Vec<Step>, Polic
             biases.iter_mut().for_each(|bias| *bias *= beta);
         }
     }
-    let (outputs, _) = weights.matrix().unwrap_or_default();
     if !matches!(biases.len(), 0 | 1) && biases.len() != outputs {
         let counts = format!("it has {} biases for {outputs} outputs", biases.len());
         return Err(refuse(&counts));
+    }
+    // copied last: nodes that are refused take no memory
+    let mut weights = match by_outputs {
+        true => weights.clone(),
+        false => weights.transposed().expect("it is a matrix"),
+    };
+    if is_gemm {
+        weights
+            .values
+            .iter_mut()
+            .for_each(|weight| *weight *= alpha);
     }
     Ok(vec![Step::Linear(weights, biases)])
 }

@@ -4,6 +4,8 @@
 //! one input. Branches that the asked output does not need, such as a critic, may have any operators.
 
 mod chain;
+#[cfg(test)]
+mod hostile;
 mod layers;
 mod message;
 mod protobuf;
@@ -15,7 +17,11 @@ pub use tensor::ReadExternal;
 
 use self::chain::{Chains, Path};
 use self::message::Model;
+use self::tensor::within;
 use crate::{Network, PolicyError};
+
+/// Bytes that all weights beside a file may have, so that names alone cannot fill the memory.
+const EXTERNAL_MAX: u64 = 1 << 30;
 
 /// What an ONNX file has.
 #[derive(Clone, Debug)]
@@ -41,7 +47,7 @@ pub fn read(
     output: Option<&str>,
     external: ReadExternal<'_>,
 ) -> Result<Policy, PolicyError> {
-    let model = Model::parse(bytes, external)?;
+    let model = Model::parse(bytes, &within(external, EXTERNAL_MAX))?;
     let graph = &model.graph;
     let names = || {
         let names: Vec<_> = graph.outputs.iter().map(|port| &*port.name).collect();

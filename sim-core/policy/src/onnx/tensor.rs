@@ -1,10 +1,13 @@
 //! Constants of an ONNX file, in single precision.
 
+use std::cell::Cell;
+
 use super::protobuf::{Value, entry, fields};
 use crate::PolicyError;
+use crate::network::SIZE_MAX;
 
-/// Reads a file beside the ONNX file, by its name: from a byte on, that many bytes or all.
-pub type ReadExternal<'a> = &'a dyn Fn(&str, u64, Option<u64>) -> Result<Vec<u8>, String>;
+/// Reads a file beside the ONNX file, by its name: from a byte on, that many bytes.
+pub type ReadExternal<'a> = &'a dyn Fn(&str, u64, u64) -> Result<Vec<u8>, String>;
 
 /// Types of numbers, as `TensorProto.DataType` has them.
 const FLOAT: i64 = 1;
@@ -157,14 +160,15 @@ impl<'a> Parts<'a> {
         let count = shape
             .as_ref()
             .and_then(|shape| shape.iter().try_fold(1usize, |all, &n| all.checked_mul(n)));
-        let (Some(shape), Some(count)) = (shape, count) else {
+        let fits = |shape: &Vec<usize>| shape.iter().all(|axis| (1..=SIZE_MAX).contains(axis));
+        let (Some(shape), Some(count)) = (shape.filter(fits), count) else {
             return Err(format!(
-                "has the shape {:?}; export the policy anew",
+                "has the shape {:?}, and axes have 1 to {SIZE_MAX} entries; export the policy anew",
                 self.axes
             ));
         };
         let values = match (self.is_external, self.raw) {
-            (true, _) => decoded(self.dtype, &self.read(external)?)?,
+            (true, _) => decoded(self.dtype, &self.read(&shape, count, external)?)?,
             (false, Some(raw)) => decoded(self.dtype, raw)?,
             (false, None) => match self.dtype {
                 FLOAT | DOUBLE => self.floats,
@@ -182,7 +186,12 @@ impl<'a> Parts<'a> {
     }
 
     /// The bytes of weights in a file of their own.
-    fn read(&self, external: ReadExternal<'_>) -> Result<Vec<u8>, String> {
+    fn read(
+        &self,
+        shape: &[usize],
+        count: usize,
+        external: ReadExternal<'_>,
+    ) -> Result<Vec<u8>, String> {
         let text = |name: &str| {
             let named = self.external.iter().find(|(known, _)| known == name);
             named.map(|(_, text)| text.as_str())
@@ -202,7 +211,13 @@ impl<'a> Parts<'a> {
                 "lies in `{file}`, which is not in the folder of the ONNX file; put it there"
             ));
         }
-        external(file, number("offset")?.unwrap_or(0), number("length")?)
+        let bytes = count as u64 * bytes_of(self.dtype)?;
+        match number("length")? {
+            Some(length) if length != bytes => Err(format!(
+                "has the shape {shape:?}, which is {bytes} bytes, and {length} in `{file}`; export the policy anew"
+            )),
+            _ => external(file, number("offset")?.unwrap_or(0), bytes),
+        }
     }
 }
 
@@ -225,6 +240,31 @@ fn decoded(dtype: i64, bytes: &[u8]) -> Result<Vec<f32>, String> {
         INT64 => all(bytes, |bytes| i64::from_le_bytes(bytes) as f32),
         BOOL => all(bytes, |[byte]| f32::from(byte)),
         other => Err(unknown(other)),
+    }
+}
+
+/// Bytes of a number.
+fn bytes_of(dtype: i64) -> Result<u64, String> {
+    match dtype {
+        FLOAT | INT32 => Ok(4),
+        DOUBLE | INT64 => Ok(8),
+        BOOL => Ok(1),
+        other => Err(unknown(other)),
+    }
+}
+
+/// `external`, for at most `limit` bytes altogether.
+pub(super) fn within(
+    external: ReadExternal<'_>,
+    limit: u64,
+) -> impl Fn(&str, u64, u64) -> Result<Vec<u8>, String> {
+    let left = Cell::new(limit);
+    move |file, offset, length| {
+        let rest = left.get().checked_sub(length).ok_or_else(|| {
+            format!("lies in `{file}`, and weights beside the ONNX file have more than {limit} bytes; give a smaller policy")
+        })?;
+        left.set(rest);
+        external(file, offset, length)
     }
 }
 

@@ -6,14 +6,14 @@ use super::*;
 use crate::Runner;
 
 /// A field of bytes.
-fn field(number: u64, bytes: &[u8]) -> Vec<u8> {
+pub(super) fn field(number: u64, bytes: &[u8]) -> Vec<u8> {
     let mut field = varint(number << 3 | 2);
     field.extend(varint(bytes.len() as u64));
     field.extend_from_slice(bytes);
     field
 }
 
-fn number(number: u64, value: u64) -> Vec<u8> {
+pub(super) fn number(number: u64, value: u64) -> Vec<u8> {
     [varint(number << 3), varint(value)].concat()
 }
 
@@ -28,7 +28,7 @@ fn varint(mut value: u64) -> Vec<u8> {
 }
 
 /// A `TensorProto` of single precision, in raw bytes.
-fn tensor(name: &str, shape: &[u64], values: &[f32]) -> Vec<u8> {
+pub(super) fn tensor(name: &str, shape: &[u64], values: &[f32]) -> Vec<u8> {
     let raw: Vec<u8> = values
         .iter()
         .flat_map(|value| value.to_le_bytes())
@@ -43,7 +43,12 @@ fn tensor(name: &str, shape: &[u64], values: &[f32]) -> Vec<u8> {
     .concat()
 }
 
-fn node(operator: &str, inputs: &[&str], output: &str, attributes: &[Vec<u8>]) -> Vec<u8> {
+pub(super) fn node(
+    operator: &str,
+    inputs: &[&str],
+    output: &str,
+    attributes: &[Vec<u8>],
+) -> Vec<u8> {
     let inputs: Vec<u8> = inputs
         .iter()
         .flat_map(|name| field(1, name.as_bytes()))
@@ -61,7 +66,7 @@ fn node(operator: &str, inputs: &[&str], output: &str, attributes: &[Vec<u8>]) -
     [inputs, texts.concat(), attributes].concat()
 }
 
-fn integer(name: &str, value: u64) -> Vec<u8> {
+pub(super) fn integer(name: &str, value: u64) -> Vec<u8> {
     [field(1, name.as_bytes()), number(3, value), number(20, 2)].concat()
 }
 
@@ -71,7 +76,7 @@ fn float(name: &str, value: f32) -> Vec<u8> {
 }
 
 /// A graph with the input `obs` of that size, if any, and the output `action`.
-fn file(nodes: &[Vec<u8>], tensors: &[Vec<u8>], size: Option<u64>) -> Vec<u8> {
+pub(super) fn file(nodes: &[Vec<u8>], tensors: &[Vec<u8>], size: Option<u64>) -> Vec<u8> {
     let all = |number, parts: &[Vec<u8>]| -> Vec<u8> {
         parts.iter().flat_map(|part| field(number, part)).collect()
     };
@@ -92,15 +97,15 @@ fn file(nodes: &[Vec<u8>], tensors: &[Vec<u8>], size: Option<u64>) -> Vec<u8> {
     [number(1, 8), field(7, &graph.concat()), field(14, &text)].concat()
 }
 
-fn no_files(file: &str, _: u64, _: Option<u64>) -> Result<Vec<u8>, String> {
+fn no_files(file: &str, _: u64, _: u64) -> Result<Vec<u8>, String> {
     Err(format!("there is no file {file}"))
 }
 
-fn parsed(bytes: &[u8]) -> Result<Policy, PolicyError> {
+pub(super) fn parsed(bytes: &[u8]) -> Result<Policy, PolicyError> {
     read(bytes, None, &no_files)
 }
 
-fn refused(nodes: &[Vec<u8>], tensors: &[Vec<u8>]) -> String {
+pub(super) fn refused(nodes: &[Vec<u8>], tensors: &[Vec<u8>]) -> String {
     parsed(&file(nodes, tensors, Some(2)))
         .unwrap_err()
         .to_string()
@@ -314,7 +319,7 @@ fn beside(location: &str) -> Vec<u8> {
 fn weights_beside_the_file_are_read_from_its_folder_alone() {
     let gemm = [node("Gemm", &["obs", "w"], "action", &[])];
     let external = |name: &str, offset, length| {
-        assert_eq!((name, offset, length), ("policy.onnx.data", 4, Some(16)));
+        assert_eq!((name, offset, length), ("policy.onnx.data", 4, 16));
         let weights = [1.0f32, 1.0, 1.0, -1.0];
         Ok(weights
             .iter()

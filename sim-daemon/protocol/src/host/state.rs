@@ -243,6 +243,10 @@ impl State {
 
     /// Sends recorders a command whose inputs were set, but that has no client left to get a frame.
     pub(super) fn record_inputs(&mut self) {
+        // the steps of a rollout were recorded one by one
+        if self.inbox.op() == Op::Rollout {
+            return;
+        }
         let occasion = Occasion {
             description: &self.description,
             inbox: &self.inbox,
@@ -252,6 +256,10 @@ impl State {
     }
 
     pub(super) fn refuse(&mut self, kind: RefusalKind, reason: &str) {
+        // nobody waits for a daemon that ends: its client sees that it goes away
+        if kind == RefusalKind::Stale && self.stop.load(Ordering::Relaxed) {
+            return;
+        }
         let Some(lease) = &mut self.lease else {
             return;
         };

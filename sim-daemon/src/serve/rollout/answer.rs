@@ -52,7 +52,7 @@ impl Answer {
         Ok((arrays, start))
     }
 
-    /// Room for an answer; `check_room` refuses what would not fit.
+    /// Room for an answer; `check_room` refuses what would not fit with `others`, bytes that are needed besides.
     ///
     /// # Errors
     /// A field that frames do not carry; too little memory.
@@ -60,10 +60,11 @@ impl Answer {
         asked: &Asked,
         worlds: usize,
         table: &Table,
+        others: u64,
         check_room: impl Fn(u64) -> Result<(), String>,
     ) -> Result<Answer, String> {
         let (arrays, bytes) = Answer::lay_out(asked, worlds, table)?;
-        check_room(2 * bytes as u64)?;
+        check_room(others.saturating_add(2 * bytes as u64))?;
         Ok(Answer {
             arrays,
             bytes: vec![0; bytes],

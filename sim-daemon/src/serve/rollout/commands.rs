@@ -142,7 +142,8 @@ impl Commands {
                 let followers = places[drive.columns.len()..].iter().zip(&drive.followers);
                 for (&place, &(_, leader, multiplier, offset)) in followers {
                     let target = multiplier * self.targets[leader] + offset;
-                    *at(&mut self.runs, place, world) += f64::from(target);
+                    // they keep to their leaders, whatever the caller adds
+                    *at(&mut self.runs, place, world) = f64::from(target);
                 }
             }
         }

@@ -184,9 +184,9 @@ impl Asked {
         let inputs = all.split_off(2);
         let memory = all.pop().ok_or_else(no_question)?;
         let parameters = all.pop().ok_or_else(no_question)?;
-        let of_inputs = question.inputs.iter().zip(&inputs);
-        let of_commands = question.commands.iter().map(|of| &of.values);
-        for (sequence, values) in of_inputs.chain(of_commands.zip(&commands)) {
+        let seen = question.inputs.iter().zip(&inputs);
+        let added = question.commands.iter().map(|command| &command.values);
+        for (sequence, values) in seen.chain(added.zip(&commands)) {
             sequence.check(values, question.frames, worlds)?;
         }
         let parameters = parameters.iter().map(|&value| value as f32).collect();

@@ -10,7 +10,7 @@ use sim_protocol::{RefusalKind, Table};
 
 use super::answer::Answer;
 use super::commands::Commands;
-use super::memory::Memory;
+use super::memory::{Memory, Places};
 use super::observation::{Observation, Real};
 use super::question::Asked;
 use crate::export::refusal::{Refusal, refusal};
@@ -44,8 +44,9 @@ impl Rollouts {
         let asked = Asked::parse(&exchange, simulation.worlds());
         let asked = asked.map_err(|problem| refused(&problem))?;
         let (epoch, seq) = (host.inbox().header().epoch, host.inbox().header().seq);
-        // a rollout comes in pieces: an evaluation between them might reset faulted worlds
-        let goes_on = asked.question.first > 0 && left == Some((epoch, seq.wrapping_sub(1)));
+        // a rollout comes in pieces, or goes on with memory: an evaluation between them might reset faulted worlds
+        let is_next = asked.question.first > 0 || !asked.memory.is_empty();
+        let goes_on = is_next && left == Some((epoch, seq.wrapping_sub(1)));
         if !goes_on {
             self.arena.resize(simulation.layout().bytes.div_ceil(8), 0);
             // the policy sees the present state, which no frame may have shown
@@ -86,11 +87,18 @@ impl Rollouts {
         let mut observation = Observation::<R>::find(asked, &table).map_err(refuse)?;
         let commands = Commands::find(asked, host.description()).map_err(refuse)?;
         let actions = asked.network.outputs();
-        let left = asked.memory.clone();
+        let inputs = asked.network.inputs();
         let terms = &asked.question.terms;
-        let memory = Memory::new(terms, observation.sizes(), actions, worlds, left);
+        let places = Places::lay_out(terms, observation.sizes(), actions, worlds);
+        let places = places.map_err(refuse)?;
+        let rows = (worlds as u64).saturating_mul((inputs + actions) as u64);
+        let rows = rows.saturating_mul(size_of::<f32>() as u64);
+        // memory is there twice at the end: for the policy, and in the answer
+        let others = rows.saturating_add(places.bytes(worlds).saturating_mul(2));
+        let answer = Answer::new(asked, worlds, &table, others, snapshot::check_room);
+        let answer = answer.map_err(refuse)?;
+        let memory = Memory::new(places, worlds, asked.memory.clone());
         let mut memory = memory.map_err(refuse)?;
-        let answer = Answer::new(asked, worlds, &table, snapshot::check_room).map_err(refuse)?;
         let mut rollout = Rollout {
             asked,
             table: &table,
@@ -99,17 +107,18 @@ impl Rollouts {
             memory: &mut memory,
             answer,
             runner: Runner::new(&asked.network),
-            observations: vec![0.0; worlds * asked.network.inputs()],
+            observations: vec![0.0; worlds * inputs],
             actions: vec![0.0; worlds * actions],
             threads,
             watched,
         };
+        rollout.begin_anew(&self.arena);
         host.put_aside();
         let frames = asked.question.frames;
         let result = (0..frames).try_for_each(|frame| {
             let step = rollout.step(frame, simulation, host, &mut self.arena, &mut self.mask);
             step.map_err(|mut refusal| {
-                let frame = asked.question.first + frame;
+                let frame = asked.question.first.saturating_add(frame);
                 refusal.reason = format!("rollout: frame {frame}: {}", refusal.reason);
                 refusal
             })
@@ -188,7 +197,8 @@ impl<R: Real> Rollout<'_, R> {
             return Err(refusal(RefusalKind::Backend, lost.to_string()));
         }
         if !is_waited_for {
-            let reason = "the client has gone, or the daemon ends".to_owned();
+            // not sent where the daemon ends
+            let reason = "the client has gone; attach again".to_owned();
             return Err(refusal(RefusalKind::Stale, reason));
         }
         self.answer
@@ -196,11 +206,23 @@ impl<R: Real> Rollout<'_, R> {
         // worlds that were reset have a new episode, and the policy with them
         let now = self.episodes(arena);
         for (world, (before, now)) in before.into_iter().zip(now).enumerate() {
+            let mut kept = self.memory.world(world);
             if now.steps < before.steps || before.is_frozen && !now.is_frozen {
-                self.memory.world(world).clear();
+                kept.clear();
             }
+            kept.set_frozen(now.is_frozen);
         }
         Ok(())
+    }
+
+    /// Clears the memory of worlds that a fault had frozen, and that were reset since.
+    fn begin_anew(&mut self, arena: &[u64]) {
+        for (world, now) in self.episodes(arena).into_iter().enumerate() {
+            let mut kept = self.memory.world(world);
+            if kept.is_frozen() && !now.is_frozen {
+                kept.clear();
+            }
+        }
     }
 
     fn observe(&mut self, frame: usize, arena: &[u64]) {

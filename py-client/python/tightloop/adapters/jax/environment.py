@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tightloop import _core
 from tightloop.adapters.environment import Given, adapted_environment, library
 from tightloop.adapters.jax.programs import Program, Result, token_as_given, token_of
+from tightloop.adapters.jax.seeds import seeds_of_key, shown, whole_seeds
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, SimClosed
 
@@ -65,7 +66,11 @@ class JaxEnv:
         )
         self._results = self._probed()
         name = type(getattr(self.env, "task", self.env)).__name__
-        self._number = _core.xla_function(_Weak(self), f"the environment of {name}")
+        self._name = f"the environment of {name}"
+        shapes = ", ".join(f"{result.name} {result.dtype}{list(result.shape)}" for result in self._results)
+        #: Part of the name of each call: what else can make it.
+        self._kind = f"{self._name} (action {[self.num_envs, self.action_size]}, {shapes})"
+        self._number = _core.xla_function(_Weak(self), self._name)
 
     def reset(self, seed: Any, state: Any = None) -> tuple[Any, Any]:
         """Start episodes in all worlds. They depend on the seeds alone.
@@ -83,7 +88,9 @@ class JaxEnv:
             ArgumentError: The seed is neither, or ``state`` is no state.
         """
         token = token_of(self._number, _ANY) if state is None else token_as_given(state)
-        state, (obs,) = self._program.call("reset", (), self._results[:1], token, _seeds(seed, self.num_envs))
+        state, (obs,) = self._program.call(
+            self._call_name("reset"), (), self._results[:1], token, _seeds(seed, self.num_envs)
+        )
         return state, obs
 
     def step(self, state: Any, action: Any) -> tuple[Any, Any, Any, Any, Any, dict[str, Any]]:
@@ -103,11 +110,14 @@ class JaxEnv:
             ArgumentError: The action has a wrong shape or type, ``state`` is no state, or JAX differentiates or batches
                 the step.
         """
-        action, shape = jnp.asarray(action), (self.num_envs, self.action_size)
-        if action.shape != shape or not jnp.issubdtype(action.dtype, jnp.number):
+        action, shape = _array(action), (self.num_envs, self.action_size)
+        is_real = any(jnp.issubdtype(action.dtype, kind) for kind in (jnp.floating, jnp.integer))
+        if action.shape != shape or not is_real:
             raise ArgumentError(f"action: expected real numbers of shape {shape}; got {action.dtype} of {action.shape}")
         action = action.astype(jnp.float32)
-        state, made = self._program.call("step", ("action",), self._results, token_as_given(state), action)
+        state, made = self._program.call(
+            self._call_name("step"), ("action",), self._results, token_as_given(state), action
+        )
         obs, reward, terminated, truncated, *rest = made
         names = [result.name for result in self._results[4:]]
         return state, obs, reward, terminated, truncated, dict(zip(names, rest, strict=True))
@@ -132,8 +142,22 @@ class JaxEnv:
             for name, array in named.items()
         ]
 
+    def _call_name(self, call: str) -> str:
+        """Return the name of a call in programs, which tells the environments that can make it from others."""
+        return f"{call} of {self._kind}"
+
     def _called(self, call: str, given: list[NDArray[Any]]) -> list[NDArray[Any]]:
-        """Make a call of a program."""
+        """Make a call of a program.
+
+        Raises:
+            ArgumentError: The program was made for something else than this environment.
+        """
+        call, _, made_for = call.partition(" of ")
+        if made_for != self._kind:
+            raise ArgumentError(
+                f"this token is of {self._kind if made_for else self._name}; the program was made for "
+                f"{made_for or 'a JaxSim'}: give each call what the last call of the same object returned"
+            )
         if call == "reset":
             obs, _ = self.env.reset(seed=given[0].tolist())
             return [_as_result(obs, self._results[0])]
@@ -169,19 +193,20 @@ def _as_result(array: Any, result: Result) -> NDArray[Any]:
     return np.ascontiguousarray(array, result.dtype)
 
 
+def _array(action: Any) -> Any:
+    try:
+        return jnp.asarray(action)
+    except (TypeError, ValueError, OverflowError):
+        raise ArgumentError(f"action is {action!r:.80}; give an array of real numbers") from None
+
+
 def _seeds(seed: Any, count: int) -> Any:
     """Return a seed per world, uint32."""
-    if isinstance(seed, int | np.integer) and not isinstance(seed, bool):
-        if not 0 <= seed < 2**32:
-            raise ArgumentError(f"reset: seed is {seed}; give a whole number from 0 to 2**32 - 1")
-        seed = jnp.uint32(seed)
-    dtype, shape = getattr(seed, "dtype", None), getattr(seed, "shape", None)
-    array: Any = seed
-    is_key = dtype is not None and jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) and shape == ()
-    if is_key or (dtype == np.uint32 and shape == (2,)):
-        return jax.random.bits(array, (count,), np.uint32)
-    if dtype is None or dtype.kind not in "iu" or shape != ():
-        given = f"{seed!r:.80}" if dtype is None else f"of {dtype} and shape {shape}"
+    drawn = seeds_of_key(seed, count)
+    if drawn is not None:
+        return drawn
+    first = whole_seeds(seed)
+    if first is None or first.shape != ():
         cure = "give a key of jax.random, or a whole number from 0 to 2**32 - 1"
-        raise ArgumentError(f"reset: seed is {given}; {cure}")
-    return array.astype(np.uint32) + jnp.arange(count, dtype=np.uint32)
+        raise ArgumentError(f"reset: seed is {shown(seed)}; {cure}")
+    return first + jnp.arange(count, dtype=np.uint32)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tightloop.adapters.environment import library
 from tightloop.adapters.jax.programs import Program, Result, token_as_given, token_of
+from tightloop.adapters.jax.seeds import seeds_of_key, shown, whole_seeds
 from tightloop.arrays.frames import unknown_field
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError, CommandRefused
@@ -52,12 +53,14 @@ class JaxSim:
         Raises:
             UnknownField: Frames of this simulation do not carry a field.
             ArgumentError: An argument is not valid, or a field has 64 bits and JAX has not.
+            SimClosed: The simulation was closed.
             MissingLibrary: ``via="ffi"``, and this JAX has no foreign functions.
         """
         if not isinstance(sim, Sim):
             raise ArgumentError(f"JaxSim: sim is {type(sim).__name__}; give a tightloop.Sim, of launch or attach")
         if isinstance(fields, str) or not all(isinstance(name, str) for name in fields):
             raise ArgumentError(f"JaxSim: fields is {fields!r:.80}; give names of fields, such as ('joint_q',)")
+        sim._client.xla_token()  # raises SimClosed
         self.sim, self.fields = sim, tuple(dict.fromkeys(fields))
         self._program = Program(via)
         self.via = self._program.via
@@ -108,6 +111,7 @@ class JaxSim:
 
         Raises:
             CommandRefused: A command has a wrong shape or type, or the scene does not have it.
+            ConstantParameter: ``body_f`` is given, and ``launch(params=("body_f",))`` was not.
             ArgumentError: The token is none, or JAX differentiates or batches the step.
         """
         given = {
@@ -130,8 +134,8 @@ class JaxSim:
         Args:
             token: The token.
             mask: Worlds to reset, bool, shape ``(worlds,)``; all if left out.
-            seed: New seeds of these worlds, whole numbers, one or ``(worlds,)``. JAX's arrays of them are cut to 32
-                bits.
+            seed: New seeds of these worlds: a key of ``jax.random``, or whole numbers from 0 to 2**32 - 1, one or
+                ``(worlds,)``. JAX's arrays of them are cut to 32 bits. With two worlds an array of two is two seeds.
             joint_q: Joint positions instead of the scene's, ``(worlds, coords)`` or ``(coords,)``.
             joint_qd: Joint velocities, likewise.
 
@@ -195,11 +199,12 @@ class JaxSim:
 
     def _columns(self, name: str, value: Any) -> Any:
         """Return a command as the client takes it, ``(worlds, columns)``."""
-        layout = self.sim._client.layout(name)
+        layout, row = self.sim._client.layout(name), COMMANDS.get(name)
+        if layout is None and row is not None and row.is_param:
+            self.sim.params.ready_columns(name, value)  # raises ConstantParameter
         if layout is None or not layout[1]:
             raise CommandRefused(f"{name}: no model of this scene has any; leave it out")
         _, columns, parts, _ = layout
-        row = COMMANDS.get(name)
         array = _array(name, value, self.sim.precision, is_switch=row is not None and row.is_switch)
         shape = (columns,) if parts == 1 else (columns // parts, parts)
         worlds = self.sim.worlds
@@ -219,11 +224,16 @@ class JaxSim:
         return array
 
     def _seeds(self, seed: Any) -> Any:
-        array, worlds = jnp.asarray(seed), self.sim.worlds
-        if array.dtype.kind not in "iu" or array.shape not in ((), (worlds,)):
-            problem = f"seed: got {array.dtype} of shape {array.shape}"
-            raise CommandRefused(f"{problem}; give a whole number, or one per world, shape ({worlds},)")
-        return array.astype(np.uint32).reshape(-1)
+        worlds = self.sim.worlds
+        if getattr(seed, "shape", None) != (worlds,):
+            drawn = seeds_of_key(seed, worlds)
+            if drawn is not None:
+                return drawn
+        seeds = whole_seeds(seed)
+        if seeds is None or seeds.shape not in ((), (worlds,)):
+            cure = f"give a key of jax.random, or whole numbers from 0 to 2**32 - 1: one, or shape ({worlds},)"
+            raise CommandRefused(f"reset: seed is {shown(seed)}; {cure}")
+        return seeds.reshape(-1)
 
     def __repr__(self) -> str:
         return f"JaxSim({self.sim!r}, fields={self.fields!r}, via={self.via!r})"
@@ -276,7 +286,7 @@ def _array(name: str, value: Any, precision: str, *, is_switch: bool) -> Any:
         raise CommandRefused(f"{name} is a dict; in JAX give an array in the order of the names, such as sim.dof_names")
     try:
         array = jnp.asarray(value)
-    except TypeError:
+    except (TypeError, ValueError, OverflowError):
         raise CommandRefused(f"{name} is {value!r:.80}; give an array of real numbers") from None
     is_real = jnp.issubdtype(array.dtype, jnp.floating) or jnp.issubdtype(array.dtype, jnp.integer)
     if not is_real and not (is_switch and array.dtype == bool):
