@@ -66,8 +66,10 @@ def _mesh(spec: Any, model: Any, place: int) -> str:
 def _joint(body: Any, model: Any, place: int) -> None:
     mujoco: Any = import_module("mujoco")
 
-    dof, coord, kind = model.jnt_dofadr[place], model.jnt_qposadr[place], model.jnt_type[place]
-    joint = body.add_joint(name=_name(model.joint(place), "joint", place), type=mujoco.mjtJoint(kind))
+    dof, coord = model.jnt_dofadr[place], model.jnt_qposadr[place]
+    # an integer of NumPy is in no tuple of MuJoCo's types
+    kind = mujoco.mjtJoint(model.jnt_type[place])
+    joint = body.add_joint(name=_name(model.joint(place), "joint", place), type=kind)
     if kind == mujoco.mjtJoint.mjJNT_FREE:
         return
     joint.pos, joint.axis = model.jnt_pos[place], model.jnt_axis[place]
