@@ -21,7 +21,7 @@ Array = NDArray[Any]
 STANDING, HEIGHT = np.tile([0.0, 0.8, -1.6], 4), 0.32
 SUBSTEPS, CONTROL_DT, EPISODE, GOAL_STEPS = 4, 0.02, 1000, 250
 GAIT, SWING, RADIUS, GROUPS = 2.5, 0.07, 0.02, [0, 1, 1, 0]
-WEIGHTS = CONTROL_DT * np.array([1.5, 0.75, -1.0, -0.05, -2.5, -2e-4, -0.01, 1.0, -0.1, -50.0])
+WEIGHTS = CONTROL_DT * np.array([1.5, -1.0, 0.75, -1.0, -0.05, -2.5, -2e-4, -0.01, 1.0, -0.1, -50.0])
 
 
 class Side:
@@ -86,6 +86,7 @@ class Side:
         fell = (gravity[:, 2] > -0.5) | (self.qpos[:, 2] < 0.15)
         terms = [
             np.exp(-4.0 * np.einsum("ni,ni->n", off, off)),
+            np.sqrt(np.einsum("ni,ni->n", off, off)),
             np.exp(-4.0 * turn * turn),
             velocity[:, 2] ** 2,
             np.einsum("ni,ni->n", turning[:, :2], turning[:, :2]),

@@ -115,6 +115,7 @@ def walking(
     fell = gravity[2] > -0.5 or height < lowest
     terms = {
         "velocity": math.exp(-4 * math.dist(command[:2], velocity[:2]) ** 2),
+        "miss": math.dist(command[:2], velocity[:2]),
         "turn": math.exp(-4 * (command[2] - turning[2]) ** 2),
         "bounce": velocity[2] ** 2,
         "rate": dot(turning[:2], turning[:2]),
@@ -141,8 +142,8 @@ def quadruped(world: World) -> Told:
     soles = [site[2] - 0.02 for site in world["site_q"]]
     obs, terms, fell = walking(world, soles=soles, swing=0.07, height=world["joint_q"][2], **TROT)
     reward = weighed(
-        terms, velocity=1.5, turn=0.75, bounce=-1.0, rate=-0.05, tilt=-2.5, torque=-2e-4, action=-0.01, gait=1.0,
-        pose=-0.1, fall=-50.0,
+        terms, velocity=1.5, miss=-1.0, turn=0.75, bounce=-1.0, rate=-0.05, tilt=-2.5, torque=-2e-4, action=-0.01,
+        gait=1.0, pose=-0.1, fall=-50.0,
     )  # fmt: skip
     return Told(obs, reward, terminated=fell)
 
@@ -154,8 +155,8 @@ def quadruped_rough(world: World) -> Told:
     soles, nearest = [foot[4] for foot in feet], [min(foot) for foot in feet]
     obs, terms, fell = walking(world, soles=soles, nearest=nearest, swing=0.08, height=scan[45], **TROT)
     reward = weighed(
-        terms, velocity=1.5, turn=0.75, bounce=-0.25, rate=-0.05, tilt=-0.5, torque=-2e-4, action=-0.01, gait=1.0,
-        pose=-0.05, fall=-50.0,
+        terms, velocity=1.5, miss=-1.0, turn=0.75, bounce=-0.25, rate=-0.05, tilt=-0.5, torque=-2e-4, action=-0.01,
+        gait=1.0, pose=-0.05, fall=-50.0,
     )  # fmt: skip
     return Told([*obs, *(scan[:91] - 0.32)], reward, terminated=fell)
 
@@ -170,8 +171,8 @@ def humanoid(world: World) -> Told:
     # pitch joints of the legs move ahead
     quiet = np.delete(world["joint_q"][7:] - standing, [0, 3, 4, 6, 9, 10])
     reward = weighed(
-        terms | {"quiet": dot(quiet, quiet)}, velocity=2.0, turn=0.75, bounce=-0.5, rate=-0.05, tilt=-2.5, torque=-1e-5,
-        action=-0.01, gait=1.0, pose=-0.05, quiet=-0.5, fall=-50.0,
+        terms | {"quiet": dot(quiet, quiet)}, velocity=2.0, miss=-1.0, turn=0.75, bounce=-0.5, rate=-0.05, tilt=-2.5,
+        torque=-1e-5, action=-0.01, gait=1.0, pose=-0.05, quiet=-0.5, fall=-50.0,
     )  # fmt: skip
     return Told(obs, reward, terminated=fell)
 

@@ -101,7 +101,8 @@ class HumanoidVelocityFlat(VelocityTask):
 
     Args:
         pushes: Largest push of the pelvis [N·s], 0 for none; if left out, one of 10 N·s for 35 kg.
-        model: URDF or MJCF of another humanoid: a path, or a model of the package ``mujoco``.
+        model: URDF or MJCF of another humanoid: a path, a model of the package ``mujoco``,
+            or ``"unitree_g1"``.
         standing: Positions of its joints when it stands [rad], by name or pattern; if left out, as declared or found.
         stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
         damping: Likewise [N·m·s/rad].
@@ -115,6 +116,7 @@ class HumanoidVelocityFlat(VelocityTask):
     command_max = (1.0, 0.4, 1.0)
     reward_weights: Mapping[str, float] = {
         "follow velocity": 2.0 * CONTROL_DT,
+        "miss": -1.0 * CONTROL_DT,
         "follow turn": 0.75 * CONTROL_DT,
         "bounce": -0.5 * CONTROL_DT,
         "roll and pitch rate": -0.05 * CONTROL_DT,

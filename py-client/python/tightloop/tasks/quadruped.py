@@ -56,7 +56,8 @@ class QuadrupedVelocityFlat(VelocityTask):
 
     Args:
         pushes: Largest push of the trunk [N·s], 0 for none; if left out, one of 4 N·s for 14.7 kg.
-        model: URDF or MJCF of another quadruped: a path, or a model of the package ``mujoco``.
+        model: URDF or MJCF of another quadruped: a path, a model of the package ``mujoco``,
+            or ``"unitree_go1"``.
         standing: Positions of its joints when it stands [rad], by name or pattern; if left out, as declared or found.
         stiffness: Gains of the drives [N·m/rad], for all joints or by name or pattern; likewise.
         damping: Likewise [N·m·s/rad].
@@ -67,6 +68,7 @@ class QuadrupedVelocityFlat(VelocityTask):
     robot = ROBOT
     reward_weights: Mapping[str, float] = {
         "follow velocity": 1.5 * CONTROL_DT,
+        "miss": -1.0 * CONTROL_DT,
         "follow turn": 0.75 * CONTROL_DT,
         "bounce": -1.0 * CONTROL_DT,
         "roll and pitch rate": -0.05 * CONTROL_DT,

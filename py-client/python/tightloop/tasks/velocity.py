@@ -239,9 +239,11 @@ class VelocityTask(Task):
         """Return the terms, before their weights."""
         own = worlds.memory
         velocity, turning, gravity, command = own["velocity"], own["turning"], own["gravity"], worlds.goal
-        turn = command[:, 2] - turning[:, 2]
+        turn, apart = command[:, 2] - turning[:, 2], squares(xp, command[:, :2] - velocity[:, :2])
         return {
-            "follow velocity": xp.exp(-4.0 * squares(xp, command[:, :2] - velocity[:, :2])),
+            "follow velocity": xp.exp(-4.0 * apart),
+            # far from the command the term before is flat, and standing is a trap
+            "miss": xp.sqrt(apart),
             "follow turn": xp.exp(-4.0 * turn * turn),
             "bounce": velocity[:, 2] * velocity[:, 2],
             "roll and pitch rate": squares(xp, turning[:, :2]),
