@@ -28,6 +28,7 @@ from tightloop.env import Worlds
 from tightloop.env.names import Names
 from tightloop.env.registry import make_task
 from tightloop.tasks.legged import LeggedModel, LeggedRobot
+from tightloop.tasks.legged_models.known import KNOWN
 from tightloop.tasks.velocity import VelocityTask
 
 with needed("mujoco", "onnxruntime"):
@@ -227,8 +228,9 @@ def main() -> None:
     # the policy's own robot, or a copy of its file elsewhere
     if args.robot:
         options["model"] = str(args.robot)
-    if "model" in options and not Path(options["model"]).is_file():
-        raise SystemExit(f"there is no robot {options['model']}; name its file by --robot")
+    model = options.get("model")
+    if model is not None and model not in KNOWN and not Path(model).is_file():
+        raise SystemExit(f"there is no robot {model}; name its file by --robot")
     try:
         compare(session, facts, options)
     except tl.TightloopError as error:

@@ -27,6 +27,18 @@ def test_it_stands(file: str) -> None:
     check_stands(MODELS / file)
 
 
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if mjlab was installed."""
+    monkeypatch.syspath_prepend(MODELS / "mjlab-1.6.0")
+
+
+@pytest.mark.usefixtures("installed")
+def test_robots_are_known_by_name() -> None:
+    check_stands("unitree_go1")
+    check_starts("unitree_g1")
+
+
 @pytest.mark.parametrize("file", HUMANOIDS)
 def test_a_humanoid_starts_on_its_feet(file: str) -> None:
     check_starts(MODELS / file)

@@ -13,7 +13,7 @@ from tightloop.env import VectorEnv
 SETTLING, STANDING = 50, 250
 
 
-def check_stands(file: Path) -> None:
+def check_stands(file: Path | str) -> None:
     """Check that a quadruped stands in its pose under actions of 0, from random starts."""
     env: Any = VectorEnv("QuadrupedVelocityFlat", 4, model=file, pushes=0.0, threads=1)
     try:
@@ -31,7 +31,7 @@ def check_stands(file: Path) -> None:
         env.close()
 
 
-def check_starts(file: Path) -> None:
+def check_starts(file: Path | str) -> None:
     """Check that a humanoid starts on its feet and has finite observations until it falls."""
     env: Any = VectorEnv("HumanoidVelocityFlat", 4, model=file, pushes=0.0, threads=1)
     try:

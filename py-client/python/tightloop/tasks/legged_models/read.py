@@ -20,6 +20,7 @@ from tightloop.tasks.legged_models import drives as gains
 from tightloop.tasks.legged_models import legs as chains
 from tightloop.tasks.legged_models import mjcf, urdf
 from tightloop.tasks.legged_models.drives import Drive
+from tightloop.tasks.legged_models.known import KNOWN, driven, known_robot, known_scale
 from tightloop.tasks.legged_models.legs import Leg
 from tightloop.tasks.legged_models.load import warn_of_load
 from tightloop.tasks.legged_models.options import values, with_mirror
@@ -42,7 +43,7 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
 
     Args:
         task: The task, for messages.
-        model: A path to URDF or MJCF, or a model of the package ``mujoco``.
+        model: A path to URDF or MJCF, a name of `known.KNOWN`, or a model of the package ``mujoco``.
         own: The robot that the task has without a model.
         count: Number of legs.
         options: What replaces what is found.
@@ -53,7 +54,8 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
         SceneError: The robot cannot be simulated.
         MissingLibrary: It is MJCF, and the package ``mujoco`` is not installed.
     """
-    what, is_urdf = _kind(task, model)
+    known = model if isinstance(model, str) and model in KNOWN else None
+    model, what, is_urdf = _source(task, model)
     spec = None
     if is_urdf:
         source = urdf.source(Path(model).expanduser())
@@ -65,8 +67,11 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
     in_legs = {joint for leg in legs for joint in leg.joints}
     every = [joint for joint in range(len(skeleton.joints)) if joint not in left_out]
     action = every if count == 2 else sorted(in_legs)
-    names = [skeleton.joints[joint].name for joint in action]
     all_names = [hinge.name for hinge in skeleton.joints]
+    if known is not None:
+        is_driven = driven(known, all_names)
+        action = [joint for joint in action if is_driven[joint]]
+    names = [all_names[joint] for joint in action]
     flip = chains.mirror(skeleton, action)
     q = standing_pose(skeleton, legs, action, flip)
     q = with_given(f"{what}: standing", skeleton, legs, q, options.standing)
@@ -83,6 +88,8 @@ def read(task: str, model: Any, *, own: LeggedRobot, count: int, options: RobotO
     ahead = [names[p] for p, joint in enumerate(action) if joint in in_legs and abs(axes[joint, 1]) > 0.7]
     leg_names = {skeleton.joints[joint].name for joint in in_legs}
     scales = [_SCALE if count == 4 or n in ahead else _ACROSS if n in leg_names else _UPPER for n in names]
+    if known is not None:
+        scales = known_scale(known, names)
     scale = values(f"{what}: scale", options.scale, names, scales)
     used = list(chosen.values())
     flip = with_mirror(flip, q[action], scale, [drive.stiffness for drive in used], [drive.damping for drive in used])
@@ -190,27 +197,30 @@ def _of_spec(
     )
 
 
-def _kind(task: str, model: Any) -> tuple[str, bool]:
-    """What a model is called in messages, and whether it is URDF."""
+def _source(task: str, model: Any) -> tuple[Any, str, bool]:
+    """The model or its path, what it is called in messages, and whether it is URDF."""
+    if isinstance(model, str) and model in KNOWN:
+        return known_robot(task, model), f"{task}: {model}", False
     if not isinstance(model, str | os.PathLike):
         kind = type(model).__name__
         if kind not in ("MjSpec", "MjModel"):
             raise ArgumentError(
                 f"{task}: model is {kind}; give the path of a URDF or MJCF file, an mujoco.MjSpec or an mujoco.MjModel"
             )
-        return f"{task}: {kind}", False
+        return model, f"{task}: {kind}", False
     # Path("") is the working directory
     if not str(model):
         raise ArgumentError(f"{task}: model is empty; give the path of a URDF or MJCF file")
     path = checks.path(f"{task}: model", model)
     if not path.is_file():
         problem = "is a folder" if path.is_dir() else "does not exist"
-        raise ArgumentError(f"{task}: model: {path} {problem}; give the path of a URDF or MJCF file")
+        names = " or ".join(KNOWN)
+        raise ArgumentError(f"{task}: model: {path} {problem}; give the path of a URDF or MJCF file, or {names}")
     kind = kind_of_file(path)
     if kind not in ("robot", "mujoco"):
         wrong = instead(f"{task}: model", path, "robot") or f"{task}: model: {path.name} is neither URDF nor MJCF"
         raise ArgumentError(f"{wrong.partition(': scene')[0]}; give the path of a URDF or MJCF file")
-    return f"{task}: {path.name}", kind == "robot"
+    return model, f"{task}: {path.name}", kind == "robot"
 
 
 def legs_of(what: str, skeleton: Skeleton, left_out: set[int], count: int) -> list[Leg]:
