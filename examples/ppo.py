@@ -2,11 +2,13 @@
 
     pip install matplotlib onnx onnxscript tensorboard torch tqdm
     python examples/ppo.py FrankaReach --seed 0     # with the wheel alone: python -m tightloop.train FrankaReach
+    python examples/ppo.py HumanoidVelocityFlat --model unitree_g1      # after pip install --no-deps mjlab
 
 Observations are read where the environment puts them, a ring of slots; each is copied once, into the rollout. What
 an action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is
 continued by the critic's value of its last observation. The learning rate follows the change of the policy (its KL
-divergence).
+divergence). With ``--mirror`` actor and critic are symmetric by construction, so that a step to the left teaches one to
+the right.
 
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
 TensorBoard, the curve as CSV and PNG, and the policy as ONNX with its metadata, which ``examples/play.py`` runs.
@@ -26,9 +28,9 @@ import math
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ from typing import Any
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
+from learning.config import MINUTES, PRESETS, Config
 from learning.films import Films
 from learning.log import Log, Statistics
 from learning.places import OUT, PLAY
@@ -45,95 +48,21 @@ from numpy.typing import NDArray
 
 from evaluation import FINAL_SEED, episodes, evaluate, told, told_with_intervals, with_unit
 from tightloop.env import AutoresetMode, VectorEnv, policy_metadata
-from tightloop.env.mirror import MirrorColumns
 from tightloop.errors import TightloopError
+from tightloop.tasks.legged_models.known import KNOWN
 from tightloop.whole_files import whole_file
 
 # onnx and onnxscript are needed only at the end, for the policy's file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     from learning.agent import Agent
+    from learning.rollout import Rollout
     from policy_file import export
     from torch import Tensor, nn
     from tqdm import tqdm
 
 MODEL_MINUTES = 10.0  # for robots that are not the task's own, at least
 RUNS = OUT / "ppo"
-
-
-@dataclass(frozen=True)
-class Config:
-    """Numbers of a run; the command line changes any of them."""
-
-    minutes: float = 3.0  # how long to train, evaluations and waiting included
-    num_envs: int = 2048
-    steps: int = 24  # of a rollout, in every world
-    epochs: int = 5  # that a rollout is learned from
-    minibatches: int = 4  # of an epoch
-    hidden: int = 128  # units of each of two layers, in actor and critic
-    gamma: float = 0.99  # what a reward is worth one step later
-    lam: float = 0.95  # λ of the advantages
-    clip: float = 0.2  # of the ratio of probabilities
-    entropy: float = 0.0  # weight of the entropy in the loss
-    lr: float = 1e-3  # learning rate at the start
-    kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
-    std: float = 0.6  # standard deviation of actions at the start
-    grad_max: float = 1.0  # norm of a gradient, at most
-    reward_scale: float = 1.0  # of the rewards that are learned from, which should be some hundredths a step
-    symmetry: bool = False  # whether to learn from the mirror image too, if the task has one
-    evaluate: float = 15.0  # seconds between evaluations
-    film_every: float = 0.0  # minutes between films of the policy; 0 for none
-    total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
-    evaluate_steps: int = 1_000_000  # env steps between them, if the run ends by steps
-    enough: float = 2.0  # success at which to stop before the time is over; above 1 it never does
-    threads: int = 1  # of the simulation
-    torch_threads: int = 1  # of the learner, and of the policy beside the simulation
-
-
-PRESETS = {
-    "CartPoleBalance": Config(minutes=0.5, num_envs=512, hidden=64, threads=1),
-    "CartPoleSwingUp": Config(
-        1.0, 256, 64, minibatches=8, hidden=64, gamma=0.98, kl=0.02, std=1.0, evaluate=10.0, threads=1
-    ),
-    "FrankaReach": Config(3.0, 512, 32, minibatches=16, gamma=0.9, kl=0.02, std=1.0),
-    "FrankaPushCube": Config(
-        15.0, 1024, 20, epochs=8, minibatches=32, gamma=0.9, lam=0.9, hidden=256, kl=0.02, evaluate=30.0
-    ),
-    "FrankaPickCube": Config(
-        60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
-    ),
-    "QuadrupedVelocityFlat": Config(5.0, 2048, 16, epochs=4, gamma=0.97, kl=0.02, std=0.7, evaluate=60.0),
-    "QuadrupedVelocityRough": Config(60.0, 1024, 24, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
-    "HumanoidVelocityFlat": Config(60.0, 2048, 16, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
-    "AntRun": Config(5.0, 1024, 16, epochs=4, kl=0.02, std=0.6, evaluate=60.0),
-    "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),
-    "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
-}
-
-
-class Rollout:
-    """What all worlds did for some steps, ``(steps, worlds, …)``."""
-
-    def __init__(
-        self, config: Config, inputs: int, actions: int, critic_inputs: int | None, device: torch.device
-    ) -> None:
-        def room(*shape: int) -> Tensor:
-            return torch.zeros((config.steps, config.num_envs, *shape), device=device)
-
-        self.obs, self.action = room(inputs), room(actions)
-        # the critic sees the same, or more
-        self.critic_obs = self.obs if critic_inputs is None else room(critic_inputs)
-        self.reward, self.done, self.log_prob, self.value, self.advantage = (room() for _ in range(5))
-
-    def look_back(self, last: Tensor, config: Config) -> None:
-        """Advantages, from the last step to the first; ``last`` is the value of the observations after it."""
-        following, advantage = last, torch.zeros_like(last)
-        for step in reversed(range(len(self.reward))):
-            goes_on = 1.0 - self.done[step]
-            error = self.reward[step] + config.gamma * goes_on * following - self.value[step]
-            advantage = error + config.gamma * config.lam * goes_on * advantage
-            self.advantage[step] = advantage
-            following = self.value[step]
 
 
 class Trainer:
@@ -166,12 +95,13 @@ class Trainer:
         space = self.envs.evaluation.privileged_space
         critic_inputs = None if space is None else space.shape[0]
         self.device = torch.device(device)
-        self.sizes = (inputs, actions, inputs if critic_inputs is None else critic_inputs, config.hidden, config.std)
-        self.agent = Agent(*self.sizes).to(self.device)
-        self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
+        sizes = (inputs, actions, inputs if critic_inputs is None else critic_inputs, config.hidden, config.std)
+        if config.mirror and self.envs.mirror is None:
+            print(f"{task}: no mirror image of the robot is known, so actor and critic are plain", file=sys.stderr)
+        self.agent = Agent(*sizes, mirrors=self.envs.mirror if config.mirror else None).to(self.device)
+        self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5, fused=True)
         self.acting = copy.deepcopy(self.agent)
         self.rollouts = [Rollout(config, inputs, actions, critic_inputs, self.device) for _ in range(2)]
-        self.mirror = self.envs.mirror if config.symmetry else None
         # one each: the threads that collect and learn run at once
         self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
         self.statistics, self.terms = Statistics(config.num_envs), TermWatch()
@@ -200,14 +130,14 @@ class Trainer:
         agent, config = self.acting, self.config
         std = torch.exp(agent.log_std)
         for step in range(config.steps):
-            rollout.obs[step].copy_(seen[0])
-            rollout.critic_obs[step].copy_(seen[1])
+            rollout.see(step, *seen)
             mean = agent(rollout.obs[step])
             action = mean + std * torch.randn(mean.shape, generator=self.noise, device=self.device)
+            self.envs.send(action.cpu().numpy())
+            # while the worlds step
             rollout.action[step] = action
             rollout.log_prob[step] = agent.log_prob(mean, action)
-            rollout.value[step] = agent.value(rollout.critic_obs[step])
-            obs, reward, terminated, truncated, infos = self.envs.step(action.cpu().numpy())
+            obs, reward, terminated, truncated, infos = self.envs.recv()
             seen = self._seen(obs, infos)
             rollout.reward[step].copy_(torch.from_numpy(reward)).mul_(config.reward_scale)
             rollout.done[step].copy_(torch.from_numpy(terminated | truncated))
@@ -215,12 +145,27 @@ class Trainer:
             cut = np.flatnonzero(truncated & ~terminated)
             if len(cut):
                 last = infos["final_info"].get("privileged", infos["final_obs"])[cut]
-                rollout.reward[step, torch.from_numpy(cut)] += config.gamma * agent.value(
-                    torch.from_numpy(last).to(self.device, torch.float32)
-                )
-        rollout.look_back(agent.value(seen[1]), config)
+                rows = torch.from_numpy(cut).to(self.device)
+                rollout.cuts.append((step, rows, torch.from_numpy(last).to(self.device, torch.float32)))
+        rollout.see(config.steps, *seen)
         self.steps += config.steps * config.num_envs
         return seen
+
+    @torch.no_grad()
+    def _look_back(self, r: Rollout) -> tuple[list[int], Tensor]:
+        """A row for each step of each world, and the sizes of its parts, which `learn` names."""
+        agent, steps = self.agent, self.config.steps
+        obs, critic_obs = agent.inputs(r.obs, r.critic_obs)
+        mean, value = agent.mean(obs[:steps]), agent.worth(critic_obs)
+        log_prob = agent.log_prob(mean, r.action)
+        advantage, target = r.look_back(value, [agent.value(last) for _, _, last in r.cuts])
+        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        # a critic that sees the same needs no columns of its own
+        of_critic = critic_obs[:steps, :, :0] if r.critic_obs is r.obs else critic_obs[:steps]
+        weight = torch.exp(log_prob - r.log_prob).clamp(max=2.0)
+        scalars = (log_prob, value[:steps], weight, advantage, target)
+        parts = (obs[:steps], of_critic, r.action, mean, *(scalar[..., None] for scalar in scalars))
+        return [part.shape[-1] for part in parts], torch.cat(parts, -1).flatten(0, 1)
 
     def learn(self, r: Rollout, progress: float) -> dict[str, float]:
         """Some epochs of minibatches over a rollout; returns what to log. ``progress`` is that of the run.
@@ -229,27 +174,20 @@ class Trainer:
         latter, and its probability relative to the former is a weight (Hilton et al. 2021, arXiv 2110.00641).
         """
         config, agent = self.config, self.agent
-        acted, advantage, value = (x.flatten() for x in (r.log_prob, r.advantage, r.value))
-        target = advantage + value
-        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        sizes, rows = self._look_back(r)
         std_old = torch.exp(agent.log_std.detach())
-        views = []
-        for obs, critic_obs, action in self._views(r):
-            with torch.no_grad():
-                mean_old, value_old = agent(obs), agent.value(critic_obs)
-                views.append((obs, critic_obs, action, mean_old, agent.log_prob(mean_old, action), value_old))
-        weight = torch.exp(views[0][4] - acted).clamp(max=2.0)
         moved, losses = [], []
-        for epoch in range(config.epochs):
-            order = torch.randperm(len(target), generator=self.shuffle, device=self.device)
+        for _ in range(config.epochs):
+            order = torch.randperm(len(rows), generator=self.shuffle, device=self.device)
             for batch in order.chunk(config.minibatches):
-                obs, critic_obs, action, mean_old, log_old, value_old = (x[batch] for x in views[epoch % len(views)])
-                mean, value = agent(obs), agent.value(critic_obs)
-                ratio, own = torch.exp(agent.log_prob(mean, action) - log_old), advantage[batch]
+                obs, critic_obs, action, mean_old, *scalars = rows[batch].split(sizes, 1)
+                log_old, value_old, weight, own, target = (scalar.squeeze(1) for scalar in scalars)
+                mean, value = agent.mean(obs), agent.worth(critic_obs if critic_obs.shape[1] else obs)
+                ratio = torch.exp(agent.log_prob(mean, action) - log_old)
                 better = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own)
                 clipped = value_old + (value - value_old).clamp(-config.clip, config.clip)
-                off = torch.max((value - target[batch]) ** 2, (clipped - target[batch]) ** 2).mean()
-                loss = off - (weight[batch] * better).mean() - config.entropy * agent.log_std.sum()
+                off = torch.max((value - target) ** 2, (clipped - target) ** 2).mean()
+                loss = off - (weight * better).mean() - config.entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)
@@ -261,27 +199,13 @@ class Trainer:
                 self.optimizer.step()
                 moved.append(kl)
                 losses.append(off.item())
-        agent.normalizer.see(r.obs)
-        agent.critic_normalizer.see(r.critic_obs)
+        agent.see(r.obs[: config.steps], r.critic_obs[: config.steps])
         return {
             "learn/kl_nats": float(np.mean(moved)),
             "learn/value_loss": float(np.mean(losses)),
             "learn/action_std": float(std_old.mean()),
             "learn/learning_rate": self.optimizer.param_groups[0]["lr"],
         }
-
-    def _views(self, r: Rollout) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-        """Observations of actor and critic, and actions: as they were and, for every other epoch, in the mirror."""
-        obs, critic_obs, action = (x.flatten(0, 1) for x in (r.obs, r.critic_obs, r.action))
-        yield obs, critic_obs, action
-        if self.mirror is None:
-            return
-
-        def flip(rows: Tensor, columns: MirrorColumns) -> Tensor:
-            return rows[:, torch.from_numpy(columns.order)] * torch.from_numpy(columns.signs).to(rows.device)
-
-        own, acts, critic = self.mirror
-        yield flip(obs, own), flip(critic_obs, own if critic is None else critic), flip(action, acts)
 
     @property
     def progress(self) -> float:
@@ -347,8 +271,9 @@ class Trainer:
 
     def snapshot(self, path: Path, about: str) -> None:
         """Write the policy to a file from which another process makes it again."""
-        weights = {name: value.cpu() for name, value in self.acting.state_dict().items()}
-        state = {"sizes": self.sizes, "agent": weights, "about": about}
+        agent = self.acting.plain()
+        weights = {name: value.cpu() for name, value in agent.state_dict().items()}
+        state = {"sizes": agent.sizes, "agent": weights, "about": about}
         with whole_file(path, durable=False) as part:
             torch.save(state, part)
 
@@ -386,7 +311,7 @@ class Trainer:
     def export(self) -> Path:
         """Write the policy as ONNX with its metadata: ``obs`` (worlds, size) in, ``action`` (worlds, actions) out."""
         path = self.folder / "policy.onnx"
-        export(self.agent.cpu(), self.envs.single_observation_space.shape[0], path, policy_metadata(self.envs))
+        export(self.agent.cpu().plain(), self.envs.single_observation_space.shape[0], path, policy_metadata(self.envs))
         return path
 
     def close(self) -> None:
@@ -401,7 +326,9 @@ def main() -> None:
         description="Train a policy.", formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     parser.add_argument("task", help=f"what to learn: {', '.join(PRESETS)}, or a task of your own, FILE.py:CLASS")
-    parser.add_argument("--model", type=Path, help="URDF or MJCF of a robot for a velocity task, instead of its own")
+    parser.add_argument(
+        "--model", help=f"URDF or MJCF of a robot for a velocity task, instead of its own, or {', '.join(KNOWN)}"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of weights, actions and episodes")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoint in the folder")
     parser.add_argument("--daemon", help="name of a running daemon to join")
@@ -415,11 +342,13 @@ def main() -> None:
     args = parser.parse_args()
     own = {option.name: getattr(args, option.name) for option in fields(Config)}
     preset = PRESETS.get(args.task, Config())
-    if args.model is not None:  # its gains and weights are found, not tuned
+    if args.model in MINUTES:
+        preset = replace(preset, minutes=MINUTES[args.model])
+    elif args.model is not None:  # its gains and weights are found, not tuned
         preset = replace(preset, minutes=max(preset.minutes, MODEL_MINUTES))
     config = replace(preset, **{name: value for name, value in own.items() if value is not None})
 
-    made, robot = ({}, "") if args.model is None else ({"model": args.model}, f"-{args.model.stem}")
+    made, robot = ({}, "") if args.model is None else ({"model": args.model}, f"-{Path(args.model).stem}")
     folder = args.out / f"{args.task.rpartition(':')[2]}{robot}-{args.seed}"
     with needed(*(["wandb"] if args.wandb else []), *(["av", "PIL"] if config.film_every else [])):
         folder.mkdir(parents=True, exist_ok=True)

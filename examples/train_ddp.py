@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from learning.config import PRESETS, Config
 from learning.places import OUT
 from learning.program import needed, report
 from numpy.typing import NDArray
@@ -30,8 +31,8 @@ with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     import torch.distributed as dist
     from learning.agent import Agent, Normalizer
+    from learning.rollout import Rollout
     from policy_file import export
-    from ppo import PRESETS, Config, Rollout
     from torch import Tensor, nn
     from torch.nn.parallel import DistributedDataParallel
 
@@ -91,30 +92,29 @@ class Trainer:
         """Fill the rollout of this rank's worlds."""
         config, r, agent = self.config, self.rollout, self.agent
         for step in range(config.steps):
-            r.obs[step].copy_(self.seen)
+            r.see(step, self.seen, self.seen)
             mean = agent(r.obs[step])
             action = mean + torch.exp(agent.log_std) * torch.randn(mean.shape, generator=self.noise)
             r.action[step], r.log_prob[step] = action, agent.log_prob(mean, action)
-            r.value[step] = agent.value(r.obs[step])
             obs, reward, terminated, truncated, infos = self.envs.step(action.numpy())
             self.seen = torch.from_numpy(obs).float()
             r.reward[step].copy_(torch.from_numpy(reward)).mul_(config.reward_scale)
             r.done[step].copy_(torch.from_numpy(terminated | truncated))
             cut = np.flatnonzero(truncated & ~terminated)
             if len(cut):  # goes on in the critic's estimate
-                last = torch.from_numpy(infos["final_obs"][cut]).float()
-                r.reward[step, torch.from_numpy(cut)] += config.gamma * agent.value(last)
-        r.look_back(agent.value(self.seen), config)
+                r.cuts.append((step, torch.from_numpy(cut), torch.from_numpy(infos["final_obs"][cut]).float()))
+        r.see(config.steps, self.seen, self.seen)
 
     def learn(self) -> None:
         """Some epochs over the rollout, with gradients averaged over the ranks."""
         config, r = self.config, self.rollout
-        obs, action, log_old, advantage, value = (
-            x.flatten(0, 1) for x in (r.obs, r.action, r.log_prob, r.advantage, r.value)
-        )
-        target, everywhere = advantage + value, of_all_ranks(advantage)
-        advantage = (advantage - everywhere.mean()) / (everywhere.std() + 1e-8)
         with torch.no_grad():
+            beyond = [self.agent.value(last) for _, _, last in r.cuts]
+            looked = r.look_back(self.agent.value(r.obs), beyond)
+            parts = (r.obs[: config.steps], r.action, r.log_prob, *looked)
+            obs, action, log_old, advantage, target = (part.flatten(0, 1) for part in parts)
+            everywhere = of_all_ranks(advantage)
+            advantage = (advantage - everywhere.mean()) / (everywhere.std() + 1e-8)
             data = (obs, action, self.agent(obs), log_old, advantage, target)
         # every rank takes as many minibatches as the others, since each waits for the others' gradients
         for _ in range(config.epochs):

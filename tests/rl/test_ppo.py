@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -206,7 +207,8 @@ trainer = ppo.Trainer('CartPoleBalance', 0, ppo.Config(num_envs=8, steps=8), '.'
 rollout, critic = trainer.rollouts[0], trainer.agent.critic
 # the critic that acted gave 0, the one that learns gives 1, and 5 is right
 critic[-1].bias.data.fill_(1.0)
-rollout.advantage.fill_(5.0)
+rollout.reward.fill_(5.0)
+rollout.done.fill_(1.0)
 trainer.learn(rollout, 0.0)
 print(trainer.agent.value(rollout.critic_obs).mean().item() > 1.05)
 trainer.close()
@@ -216,7 +218,8 @@ trainer.close()
     assert done.stdout == "True\n", done.stdout + done.stderr
 
 
-def test_a_run_that_ends_by_steps_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+@pytest.mark.parametrize("task", ["CartPoleSwingUp", "QuadrupedVelocityFlat"])
+def test_a_run_that_ends_by_steps_goes_on_with_the_same_bits(task: str, tmp_path: Path) -> None:
     code = f"""
 import ppo, torch
 from pathlib import Path
@@ -225,11 +228,15 @@ from learning.log import Log
 class Stopped(Exception):
     pass
 
+task = {task!r}
+
 def run(folder, stop_at=None, resume=False):
     folder = Path({str(tmp_path)!r}) / folder
     folder.mkdir(exist_ok=True)
-    config = ppo.Config(num_envs=64, steps=16, total=16 * 64 * 9, evaluate_steps=16 * 64 * 3)
-    trainer = ppo.Trainer('CartPoleSwingUp', 3, config, folder, daemon=None, device='cpu')
+    mirror = task != 'CartPoleSwingUp'
+    config = ppo.Config(num_envs=64, steps=16, total=16 * 64 * 9, evaluate_steps=16 * 64 * 3, mirror=mirror)
+    trainer = ppo.Trainer(task, 3, config, folder, daemon=None, device='cpu')
+    assert mirror == (trainer.agent.halves is not None)
     if resume:
         trainer.resume()
     save = trainer.save
