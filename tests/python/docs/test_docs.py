@@ -90,6 +90,7 @@ def test_blocks_that_do_not_run_say_why():
         "needs rsl-rl-lib": 1,
         "needs skrl": 1,
         "needs stable-baselines3": 1,
+        "needs torch, mujoco, and minutes": 1,
         "needs torch, and minutes": 3,
         "needs torchrl": 1,
         "needs torchrun": 1,
