@@ -198,7 +198,7 @@ setattr(mine.robots["arm"], "joint_q", {"joint1": 0.5})   | 'joint1', .*did you 
 mine.randomize(joint_q={"arm": (0, 1)})                   | \(0, 1\); give a tightloop\.Uniform
 tl.Uniform((0, 1))                                        | Uniform: `high` is missing
 tl.launch(scene(), worlds=1, fields=("joint_pos",))       | there is no such field; did you mean `joint_q`
-tl.launch(scene(), worlds=1, params=("frictions",))       | no such parameter; did you mean `joint_friction`
+tl.launch(scene(), worlds=1, params=("frictions",))       | no such parameter; did you mean .*`joint_friction`
 tl.launch(scene(), worlds=1, seed=1)                      | no argument `seed`; `sim\.reset\(seed=…\)`
 tl.launch(scene(), worlds=1, headless=True)               | no argument `headless`; leave it out: .*`sim\.view\(\)`
 tl.launch(scene(), worlds=1, render=True)                 | no argument `render`; a simulation has no window

@@ -148,13 +148,11 @@ fn linear(node: &Node, constants: &[Option<&Tensor>]) -> Result<Vec<Step>, Polic
     let outputs = if by_outputs { rows } else { columns };
     let [alpha, beta] = ["alpha", "beta"].map(|name| node.float(name).unwrap_or(1.0));
     let mut biases = Vec::new();
-    if is_gemm {
-        if let Some(tensor) = constant(2) {
-            let row = tensor.single().map(|value| vec![value]);
-            let row = row.or_else(|| tensor.as_row().map(<[f32]>::to_vec));
-            biases = row.ok_or_else(|| refuse("its biases are no row"))?;
-            biases.iter_mut().for_each(|bias| *bias *= beta);
-        }
+    if is_gemm && let Some(tensor) = constant(2) {
+        let row = tensor.single().map(|value| vec![value]);
+        let row = row.or_else(|| tensor.as_row().map(<[f32]>::to_vec));
+        biases = row.ok_or_else(|| refuse("its biases are no row"))?;
+        biases.iter_mut().for_each(|bias| *bias *= beta);
     }
     if !matches!(biases.len(), 0 | 1) && biases.len() != outputs {
         let counts = format!("it has {} biases for {outputs} outputs", biases.len());
