@@ -118,11 +118,14 @@ fn beside(folder: &Path, name: &str, offset: u64, length: u64) -> Result<Vec<u8>
         ));
     }
     let mut file = File::open(&canonical).map_err(failed)?;
-    let there = file.metadata().map_err(failed)?.len();
-    let there = there.saturating_sub(offset);
-    if length > there || length > FILE_MAX {
+    let rest = file
+        .metadata()
+        .map_err(failed)?
+        .len()
+        .saturating_sub(offset);
+    if length > rest || length > FILE_MAX {
         return Err(format!(
-            "lies in {}, of which it needs {length} bytes from {offset} on, and there are {there}; export the policy anew",
+            "lies in {}, of which it needs {length} bytes from {offset} on, and there are {rest}; export the policy anew",
             path.display()
         ));
     }

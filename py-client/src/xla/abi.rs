@@ -215,7 +215,7 @@ unsafe fn read<'a>(frame: &'a CallFrame) -> Result<Call<'a>, Failure> {
     let (operands, outputs) = unsafe { (frame.operands.buffers()?, frame.outputs.buffers()?) };
     let operands = operands.into_iter().map(|buffer| {
         let (kind, shape, bytes) = buffer.extent()?;
-        // SAFETY: the buffer has these bytes until the handler returns, and nobody writes to an operand.
+        // SAFETY: the buffer has these bytes until the handler returns, and an operand is not written.
         let bytes = unsafe { std::slice::from_raw_parts(buffer.start(bytes), bytes) };
         Ok(Operand { kind, shape, bytes })
     });

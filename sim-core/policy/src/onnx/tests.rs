@@ -1,4 +1,4 @@
-//! Files by hand: what exporters write, and what nobody should.
+//! Files by hand: those that exporters write, and malformed ones.
 
 use proptest::prelude::*;
 

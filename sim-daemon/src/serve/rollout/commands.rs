@@ -130,13 +130,8 @@ impl Commands {
                     let low = drive.low[k].unwrap_or(f32::NEG_INFINITY);
                     let high = drive.high[k].unwrap_or(f32::INFINITY);
                     let target = drive.offset[k] + drive.scale[k] * action[drive.values[k]];
-                    *value = match *value {
-                        0.0 => f64::from(target.clamp(low, high)),
-                        added => {
-                            let ends = (f64::from(low), f64::from(high));
-                            (f64::from(target) + added).clamp(ends.0, ends.1)
-                        }
-                    };
+                    let sum = f64::from(target) + *value;
+                    *value = sum.clamp(f64::from(low), f64::from(high));
                     self.targets.push(*value as f32);
                 }
                 let followers = places[drive.columns.len()..].iter().zip(&drive.followers);

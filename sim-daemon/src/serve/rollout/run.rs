@@ -109,6 +109,7 @@ impl Rollouts {
             runner: Runner::new(&asked.network),
             observations: vec![0.0; worlds * inputs],
             actions: vec![0.0; worlds * actions],
+            episodes: vec![Episode::default(); worlds],
             threads,
             watched,
         };
@@ -160,6 +161,8 @@ struct Rollout<'a, R> {
     observations: Vec<f32>,
     /// `(worlds, outputs)` of the network, within bounds.
     actions: Vec<f32>,
+    /// Of the last frame.
+    episodes: Vec<Episode>,
     threads: usize,
     watched: usize,
 }
@@ -186,7 +189,6 @@ impl<R: Real> Rollout<'_, R> {
         if let Some(sharing) = simulation.sharing() {
             sharing.stage_shared(&[]);
         }
-        let before = self.episodes(arena);
         let mut shown = Shown {
             simulation,
             advance: Advance::Step,
@@ -204,8 +206,8 @@ impl<R: Real> Rollout<'_, R> {
         self.answer
             .collect(self.asked, frame, arena, &self.actions, &self.observations);
         // worlds that were reset have a new episode, and the policy with them
-        let now = self.episodes(arena);
-        for (world, (before, now)) in before.into_iter().zip(now).enumerate() {
+        for (world, now) in episodes(self.table, arena).enumerate() {
+            let before = std::mem::replace(&mut self.episodes[world], now);
             let mut kept = self.memory.world(world);
             if now.steps < before.steps || before.is_frozen && !now.is_frozen {
                 kept.clear();
@@ -217,7 +219,8 @@ impl<R: Real> Rollout<'_, R> {
 
     /// Clears the memory of worlds that a fault had frozen, and that were reset since.
     fn begin_anew(&mut self, arena: &[u64]) {
-        for (world, now) in self.episodes(arena).into_iter().enumerate() {
+        for (world, now) in episodes(self.table, arena).enumerate() {
+            self.episodes[world] = now;
             let mut kept = self.memory.world(world);
             if kept.is_frozen() && !now.is_frozen {
                 kept.clear();
@@ -249,26 +252,26 @@ impl<R: Real> Rollout<'_, R> {
                 .for_each(|(last, value)| *last = f64::from(*value));
         }
     }
+}
 
-    fn episodes(&self, arena: &[u64]) -> Vec<Episode> {
-        let bytes: &[u8] = bytemuck::cast_slice(arena);
-        let counter = |name: &str| {
-            let row = self.table.row(name).expect("every frame has it");
-            &bytes[row.offset - Table::head_bytes(self.table.rows().len())..][..row.bytes]
-        };
-        let steps: &[u64] = bytemuck::cast_slice(counter("step"));
-        let faults: &[u32] = bytemuck::cast_slice(counter("status"));
-        let episodes = steps.iter().zip(faults);
-        episodes
-            .map(|(&steps, &faults)| Episode {
-                steps,
-                is_frozen: faults & status::FROZEN != 0,
-            })
-            .collect()
-    }
+/// Where each world of a frame is in its episode.
+fn episodes<'a>(table: &Table, arena: &'a [u64]) -> impl Iterator<Item = Episode> + use<'a> {
+    let bytes: &[u8] = bytemuck::cast_slice(arena);
+    let counter = |name: &str| {
+        let row = table.row(name).expect("every frame has it");
+        &bytes[row.offset - Table::head_bytes(table.rows().len())..][..row.bytes]
+    };
+    let steps: &[u64] = bytemuck::cast_slice(counter("step"));
+    let faults: &[u32] = bytemuck::cast_slice(counter("status"));
+    let both = steps.iter().zip(faults);
+    both.map(|(&steps, &faults)| Episode {
+        steps,
+        is_frozen: faults & status::FROZEN != 0,
+    })
 }
 
 /// Where a world is in its episode.
+#[derive(Clone, Copy, Default)]
 struct Episode {
     /// Control frames since the reset.
     steps: u64,

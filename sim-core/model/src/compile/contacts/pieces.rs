@@ -317,17 +317,17 @@ fn piece(
 ) -> Piece {
     let rows = pose.rotation();
     let axes = std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]));
+    let [twist, roll] = b.turning_mu();
+    let Softness { solref, solimp } = b.softness();
+    let ([time, ratio], [d_min, d_max, width, midpoint, power]) = (solref, solimp);
     Piece {
         shape,
         solid: Solid {
             kind,
             shape: b.number,
             link: b.link,
-            friction: [b.surface.mu, b.turning_mu()[0], b.turning_mu()[1]],
-            softness: std::array::from_fn(|k| match k.checked_sub(2) {
-                None => b.softness().solref[k],
-                Some(k) => b.softness().solimp[k],
-            }),
+            friction: [b.surface.mu, twist, roll],
+            softness: [time, ratio, d_min, d_max, width, midpoint, power],
             body: b.body,
             axes,
             is_upright: axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
