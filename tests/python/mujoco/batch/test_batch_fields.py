@@ -96,6 +96,14 @@ def changed(model: mujoco.MjModel, field: str, rng: np.random.Generator) -> np.n
     return value
 
 
+def vary(batch: Batch, models: list[mujoco.MjModel], field: str, rng: np.random.Generator) -> None:
+    """Give a field other values in each simulation, and its model the same."""
+    values = batch.expand(field)
+    for sim, own in enumerate(models):
+        values[sim] = changed(batch.model, field, rng)
+        getattr(own, field)[:] = values[sim]
+
+
 def start(batch: Batch, lockstep: Lockstep) -> None:
     """Let the bodies slide, spin and roll, and the arm swing into its limits."""
     lockstep.write("qpos", np.tile(batch.model.qpos0, (N, 1)))
@@ -119,11 +127,7 @@ def test_a_field_acts_as_in_a_model_of_its_own(field: str, integrator: str) -> N
     model = model_of("elliptic" if integrator == "Euler" else "pyramidal", integrator)
     models = separate(model)
     with Batch(model, N, 1, precision="f64") as batch:
-        values = batch.expand(field)
-        rng = np.random.default_rng(FIELDS.index(field))
-        for sim, own in enumerate(models):
-            values[sim] = changed(model, field, rng)
-            getattr(own, field)[:] = values[sim]
+        vary(batch, models, field, np.random.default_rng(FIELDS.index(field)))
         lockstep = Lockstep(batch, models)
         start(batch, lockstep)
         lockstep.step(nstep=30)
@@ -145,10 +149,7 @@ def test_all_fields_act_together_in_single_precision(device: str) -> None:
     with Batch(model, N, 1, precision="f32", device=device) as batch:
         rng = np.random.default_rng(5)
         for field in FIELDS:
-            values = batch.expand(field)
-            for sim, own in enumerate(models):
-                values[sim] = changed(model, field, rng)
-                getattr(own, field)[:] = values[sim]
+            vary(batch, models, field, rng)
         lockstep = Lockstep(batch, models)
         start(batch, lockstep)
         lockstep.step(nstep=10)
