@@ -46,9 +46,15 @@ PRESETS = {
     "FrankaPickCube": Config(
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
-    "QuadrupedVelocityFlat": Config(5.0, 512, 16, epochs=2, gamma=0.97, kl=0.03, std=0.7, mirror=True, evaluate=30.0),
-    "QuadrupedVelocityRough": Config(60.0, 1024, 24, epochs=4, gamma=0.98, kl=0.02, std=0.7, evaluate=120.0),
-    "HumanoidVelocityFlat": Config(20.0, 512, 16, epochs=2, gamma=0.98, kl=0.04, std=0.6, mirror=True, evaluate=60.0),
+    "QuadrupedVelocityFlat": Config(
+        5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
+    ),
+    "QuadrupedVelocityRough": Config(
+        60.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=120.0
+    ),
+    "HumanoidVelocityFlat": Config(
+        20.0, 512, 16, epochs=2, gamma=0.99, entropy=0.004, kl=0.04, std=0.6, mirror=True, evaluate=60.0
+    ),
     "AntRun": Config(5.0, 1024, 16, epochs=4, kl=0.02, std=0.6, evaluate=60.0),
     "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),

@@ -126,7 +126,7 @@ class HumanoidVelocityFlat(VelocityTask):
         "gait": 1.0 * CONTROL_DT,
         "pose": -0.05 * CONTROL_DT,
         "upper body": -0.5 * CONTROL_DT,
-        "fall": -1.0,
+        "fall": -5.0,
     }
 
     def __init__(

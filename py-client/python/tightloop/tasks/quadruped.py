@@ -77,7 +77,7 @@ class QuadrupedVelocityFlat(VelocityTask):
         "action rate": -0.01 * CONTROL_DT,
         "gait": 1.0 * CONTROL_DT,
         "pose": -0.1 * CONTROL_DT,
-        "fall": -1.0,
+        "fall": -3.0,
     }
 
     def __init__(
