@@ -66,6 +66,7 @@ class QuadrupedVelocityFlat(VelocityTask):
 
     legs = 4
     robot = ROBOT
+    goal_steps = 100
     reward_weights: Mapping[str, float] = {
         "follow velocity": 1.5 * CONTROL_DT,
         "miss": -1.0 * CONTROL_DT,
@@ -77,7 +78,7 @@ class QuadrupedVelocityFlat(VelocityTask):
         "action rate": -0.01 * CONTROL_DT,
         "gait": 1.0 * CONTROL_DT,
         "pose": -0.1 * CONTROL_DT,
-        "fall": -3.0,
+        "fall": -6.0,
     }
 
     def __init__(

@@ -79,6 +79,7 @@ class QuadrupedVelocityRough(QuadrupedVelocityFlat):
         "bounce": -0.25 * CONTROL_DT,
         "tilt": -0.5 * CONTROL_DT,
         "pose": -0.05 * CONTROL_DT,
+        "fall": -2.0,
     }
 
     def __init__(
