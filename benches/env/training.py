@@ -98,7 +98,9 @@ def train(run: Run, seed: int, out: Path, minutes: float | None) -> dict[str, st
 def keep(run: Run, seeds: Sequence[int], out: Path) -> None:
     """Copy the curves of all seeds, and the picture and policy of the first one, to examples/trained."""
     for seed in seeds:
-        shutil.copy(out / f"{run.name}-{seed}/curve.csv", TRAINED / f"curves/{run.name}-{seed}.csv")
+        curve = TRAINED / f"curves/{run.name}/{seed}.csv"
+        curve.parent.mkdir(exist_ok=True)
+        shutil.copy(out / f"{run.name}-{seed}/curve.csv", curve)
     first = out / f"{run.name}-{seeds[0]}"
     shutil.copy(first / "curve.png", TRAINED / f"plots/{run.name}-{seeds[0]}.png")
     shutil.copy(first / "policy.onnx", TRAINED / f"{run.name}.onnx")
