@@ -143,7 +143,7 @@ def quadruped(world: World) -> Told:
     obs, terms, fell = walking(world, soles=soles, swing=0.07, height=world["joint_q"][2], **TROT)
     reward = weighed(
         terms, velocity=1.5, miss=-1.0, turn=0.75, bounce=-1.0, rate=-0.05, tilt=-2.5, torque=-2e-4, action=-0.01,
-        gait=1.0, pose=-0.1, fall=-50.0,
+        gait=1.0, pose=-0.1, fall=-300.0,
     )  # fmt: skip
     return Told(obs, reward, terminated=fell)
 
@@ -156,7 +156,7 @@ def quadruped_rough(world: World) -> Told:
     obs, terms, fell = walking(world, soles=soles, nearest=nearest, swing=0.08, height=scan[45], **TROT)
     reward = weighed(
         terms, velocity=1.5, miss=-1.0, turn=0.75, bounce=-0.25, rate=-0.05, tilt=-0.5, torque=-2e-4, action=-0.01,
-        gait=1.0, pose=-0.05, fall=-50.0,
+        gait=1.0, pose=-0.05, fall=-100.0,
     )  # fmt: skip
     return Told([*obs, *(scan[:91] - 0.32)], reward, terminated=fell)
 
@@ -172,7 +172,7 @@ def humanoid(world: World) -> Told:
     quiet = np.delete(world["joint_q"][7:] - standing, [0, 3, 4, 6, 9, 10])
     reward = weighed(
         terms | {"quiet": dot(quiet, quiet)}, velocity=2.0, miss=-1.0, turn=0.75, bounce=-0.5, rate=-0.05, tilt=-2.5,
-        torque=-1e-5, action=-0.01, gait=1.0, pose=-0.05, quiet=-0.5, fall=-50.0,
+        torque=-1e-5, action=-0.01, gait=1.0, pose=-0.05, quiet=-0.5, fall=-250.0,
     )  # fmt: skip
     return Told(obs, reward, terminated=fell)
 
