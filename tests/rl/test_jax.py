@@ -246,6 +246,14 @@ def test_a_killed_daemon_is_an_error_within_a_second_and_a_new_one_goes_on(via):
         assert new.forward(new.token())[1].joint_q.shape == (WORLDS, 2)
 
 
+def test_a_token_that_a_program_would_keep_is_refused(sim):
+    made = JaxSim(sim)
+    with pytest.raises(tl.ArgumentError, match=r"token\(\) was called inside of a program; call it before"):
+        jax.jit(lambda: made.forward(made.token()))()
+    with pytest.raises(tl.ArgumentError, match=r"token is .*; give what `token\(\)` or the last call"):
+        made.forward(jnp.zeros(3))
+
+
 @WAYS
 def test_closing_the_simulation_ends_a_program(via):
     sim = launch()
@@ -313,18 +321,18 @@ def test_frames_that_are_held_are_an_error():
 def test_gradients_and_vmap_are_refused_by_name(sim, via, wrap):
     made, given = JaxSim(sim, via=via), jnp.asarray(forces(3))
     run = wrap(steps_of(made))
-    before = sim.forward().step.tolist()
+    before, token = sim.forward().step.tolist(), made.token()
     for change in (jax.grad, jax.value_and_grad, jax.jacfwd, jax.jacrev, jax.hessian):
         with pytest.raises(tl.ArgumentError, match=r"no gradient in JAX.*tightloop\.linearize"):
-            change(lambda g: run(made.token(), g)[1].joint_q.sum())(given)
+            change(lambda g: run(token, g)[1].joint_q.sum())(given)
     for change in (jax.vmap, lambda f: jax.jit(jax.vmap(f))):
         with pytest.raises(tl.ArgumentError, match=r"vmap does not go over a step.*its worlds are the batch"):
-            change(lambda g: run(made.token(), g)[1].joint_q)(given[None])
+            change(lambda g: run(token, g)[1].joint_q)(given[None])
         with pytest.raises(tl.ArgumentError, match="its worlds are the batch"):
-            change(lambda mask: made.reset(made.token(), mask=mask)[1])(jnp.ones((2, WORLDS), bool))
+            change(lambda mask: made.reset(token, mask=mask)[1])(jnp.ones((2, WORLDS), bool))
     assert sim.forward().step.tolist() == before
     # with its commands kept out of the gradient, a step may be part of a loss
-    loss = jax.grad(lambda w: (w * run(made.token(), lax.stop_gradient(w * given))[1].joint_q).sum())
+    loss = jax.grad(lambda w: (w * run(token, lax.stop_gradient(w * given))[1].joint_q).sum())
     assert np.isfinite(loss(1.0))
 
 
@@ -344,7 +352,7 @@ def test_commands_and_masks_that_do_not_fit_are_refused_by_name(sim):
         with pytest.raises(tl.CommandRefused, match=r"mask: got .* bool, shape \(5,\)"):
             made.reset(made.token(), mask=mask)
     with pytest.raises(tl.ConstantParameter, match=r'name it at launch: params=\("body_f",\)'):
-        jax.jit(lambda push: made.step(made.token(), body_f=push))(jnp.zeros((len(sim.body_names), 6)))
+        jax.jit(lambda token, push: made.step(token, body_f=push))(made.token(), jnp.zeros((len(sim.body_names), 6)))
     with pytest.raises(tl.UnknownField, match="body_qd"):
         JaxSim(sim, ("body_qd",))
     with pytest.raises(tl.SignatureError, match="joint_targets"):

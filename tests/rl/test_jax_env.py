@@ -112,7 +112,7 @@ def test_errors_of_an_environment_have_their_names(made, hasty, via):
         env.step(after, jnp.zeros((WORLDS, 2)))
     with pytest.raises(tl.ArgumentError, match=r"action: expected real numbers.*got complex64"):
         env.step(after, action + 1j)
-    with pytest.raises(tl.ArgumentError, match="token is"):
+    with pytest.raises(tl.ArgumentError, match=r"state is .*; give what `reset\(\)` or the last call"):
         env.step(None, action)
     with pytest.raises(tl.ArgumentError, match=r"tightloop\.linearize"):
         jax.grad(lambda a: env.step(env.reset(1)[0], a)[2].sum())(action)

@@ -87,7 +87,7 @@ class JaxEnv:
         Raises:
             ArgumentError: The seed is neither, or ``state`` is no state.
         """
-        token = token_of(self._number, _ANY) if state is None else token_as_given(state)
+        token = token_of(self._number, _ANY) if state is None else token_as_given(state, "state", "reset()")
         state, (obs,) = self._program.call(
             self._call_name("reset"), (), self._results[:1], token, _seeds(seed, self.num_envs)
         )
@@ -116,7 +116,7 @@ class JaxEnv:
             raise ArgumentError(f"action: expected real numbers of shape {shape}; got {action.dtype} of {action.shape}")
         action = action.astype(jnp.float32)
         state, made = self._program.call(
-            self._call_name("step"), ("action",), self._results, token_as_given(state), action
+            self._call_name("step"), ("action",), self._results, token_as_given(state, "state", "reset()"), action
         )
         obs, reward, terminated, truncated, *rest = made
         names = [result.name for result in self._results[4:]]

@@ -64,19 +64,29 @@ class Program:
         return token, arrays
 
 
+def traces() -> bool:
+    """Return whether JAX traces a program."""
+    return isinstance(jax.numpy.zeros(()), jax.core.Tracer)
+
+
 def token_of(number: int, calls: int) -> Any:
     """Return a token as an array of JAX: the number of what is called, and its calls so far."""
     return jax.numpy.asarray(np.array([number, calls], np.uint32))
 
 
-def token_as_given(token: Any) -> Any:
+def token_as_given(token: Any, name: str, begin: str) -> Any:
     """Return a token as calls take it.
+
+    Args:
+        token: The token.
+        name: What the caller calls it.
+        begin: The function that returns the first one.
 
     Raises:
         ArgumentError: It is none.
     """
     if getattr(token, "shape", None) != (2,) or getattr(token, "dtype", None) != np.uint32:
-        raise ArgumentError(f"token is {token!r:.80}; give what `token()` or the last call returned first")
+        raise ArgumentError(f"{name} is {token!r:.80}; give what `{begin}` or the last call returned first")
     return token
 
 

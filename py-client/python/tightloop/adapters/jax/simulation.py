@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tightloop.adapters.environment import library
-from tightloop.adapters.jax.programs import Program, Result, token_as_given, token_of
+from tightloop.adapters.jax.programs import Program, Result, token_as_given, token_of, traces
 from tightloop.adapters.jax.seeds import seeds_of_key, shown, whole_seeds
 from tightloop.arrays.frames import unknown_field
 from tightloop.checks.signatures import checked_calls
@@ -77,7 +77,10 @@ class JaxSim:
 
         Raises:
             SimClosed: The simulation was closed.
+            ArgumentError: JAX traces a program, which would keep this token for all of its runs.
         """
+        if traces():
+            raise ArgumentError("token() was called inside of a program; call it before, and give it as an argument")
         return token_of(*self.sim._client.xla_token())
 
     def step(
@@ -194,7 +197,9 @@ class JaxSim:
             _check_bits(result)
         inputs = {key: value for key, value in given.items() if value is not None}
         arrays = [value if key == "seed" else self._columns(key, value) for key, value in inputs.items()]
-        token, made = self._program.call(name, [*inputs], self._results, token_as_given(token), *mask, *arrays)
+        token, made = self._program.call(
+            name, [*inputs], self._results, token_as_given(token, "token", "token()"), *mask, *arrays
+        )
         return token, _kind_of(self.fields)(*made)
 
     def _columns(self, name: str, value: Any) -> Any:
