@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -226,6 +227,44 @@ def test_a_field_that_does_not_vary_is_refused_with_its_world(sim_of: Make) -> N
     sim.model.geom_size[2, 2] = 0.2
     with pytest.raises(tl.ArgumentError, match="2: geom_size"):
         sim.step()
+
+
+@pytest.mark.parametrize(
+    ("name", "cure"),
+    [
+        ("body_mass", r"call sim\.expand_model_fields\(\(\"body_mass\",\)\) before you write it"),
+        ("jnt_stiffness", "set it in the config of the environment instead"),
+        ("opt.gravity", "set it in the config of the environment instead"),
+        ("opt.timestep", "set it in the config of the environment instead"),
+    ],
+)
+@pytest.mark.parametrize("inference", [False, True])
+def test_a_write_that_does_not_reach_the_worlds_is_refused(name: str, cure: str, inference: bool, sim_of: Make) -> None:
+    sim = sim_of()
+    sim.step()
+    with torch.inference_mode(inference):
+        home = sim.model.opt if name.startswith("opt.") else sim.model
+        field = getattr(home, name.removeprefix("opt."))
+        # all worlds share the row; torch refuses to write it for each of them
+        before = field[0].clone()
+        field[0] = before
+        sim.step()
+        field[0] = 2.0 * before + 1.0
+        for call in (sim.step, sim.forward):
+            with pytest.raises(tl.ArgumentError, match=rf"sim\.model\.{re.escape(name)} was written.*{cure}"):
+                call()
+        field[0] = before
+        sim.step()
+
+
+def test_a_field_that_is_expanded_again_keeps_its_values(sim_of: Make) -> None:
+    sim = sim_of()
+    for _ in range(2):
+        sim.expand_model_fields(("body_mass",))
+        sim.model.body_mass[1, -1] *= 2.0
+    assert len(np.unique(sim.model.body_mass[:, -1])) == 2
+    assert sim.model.body_mass[1, -1] == 4.0 * sim.model.body_mass[0, -1]
+    sim.step()
 
 
 def test_install_replaces_the_simulation_in_every_module(tmp_path: Path) -> None:

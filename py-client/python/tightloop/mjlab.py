@@ -25,7 +25,11 @@ def main() -> int:
     name, *rest = sys.argv[1:] or [""]
     if name not in SCRIPTS:
         print(f"usage: python -m tightloop.mjlab {{{','.join(SCRIPTS)}}} …", file=sys.stderr)
-        return 0 if name in ("-h", "--help") else 2
+        if name in ("-h", "--help"):
+            return 0
+        if name:
+            print(f"mjlab has no script `{name}`", file=sys.stderr)
+        return 2
     # mjlab chooses a GPU for its tensors where torch sees one, and they belong beside the worlds
     os.environ["CUDA_VISIBLE_DEVICES"] = ""
     # threads of torch that wait by spinning would take the cores from the worlds
@@ -34,6 +38,7 @@ def main() -> int:
 
     try:
         mjlab.install()
+        print("mjlab simulates with tightloop, on the CPU", file=sys.stderr)
         sys.argv = [f"python -m tightloop.mjlab {name}", *rest]
         importlib.import_module(SCRIPTS[name]).main()
     except TightloopError as error:

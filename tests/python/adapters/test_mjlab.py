@@ -36,6 +36,7 @@ def test_the_command_names_its_scripts(words: list[str], code: int) -> None:
     )
     assert done.returncode == code
     assert "usage: python -m tightloop.mjlab {train,play,list-envs,viz-nan}" in done.stdout + done.stderr
+    assert ("mjlab has no script `fly`" in done.stderr) == (words == ["fly"])
 
 
 def test_the_adapter_imports_neither_mjlab_nor_torch() -> None:

@@ -27,7 +27,7 @@ class ModelFields:
 
     def __init__(self, model: Any, worlds: int) -> None:
         self._model, self._ids = model, np.arange(worlds)
-        self._expansions = Expansions(model, worlds)
+        self._expansions = Expansions(model, worlds, "remove the event that writes it")
         self._tensors: dict[str, Any] = {}
         # what the parameters were made of last: counts of the writes to each tensor
         self._versions: tuple[int, ...] = ()
@@ -41,7 +41,9 @@ class ModelFields:
         return name in self._expansions and not is_visual(name)
 
     def expand(self, name: str) -> None:
-        """Give a field a value per world; see `Expansions.get`."""
+        """Give a field a value per world; see `Expansions.get`. One that has some keeps them."""
+        if name in self._tensors:
+            return
         dtype = np.float32 if np.asarray(self._expansions.of(name)).dtype == np.float64 else None
         # a tensor of inference would not count its writes
         with torch.inference_mode(False):

@@ -78,14 +78,20 @@ class Simulation(simulations.Simulation):
         self._fields.recompute()
 
     def forward(self) -> None:
-        """Evaluate all fields at the present state, commands and parameters."""
+        """Evaluate all fields at the present state, commands and parameters. Raises as `step` does."""
+        self._model_bridge.check()
         self.worlds.forward()
         if self.worlds.touched.intersection(LIT):
             self._place()
             self.worlds.bring()
 
     def step(self) -> None:
-        """Advance all worlds by a time step. As with MuJoCo, derived fields then lag by that step."""
+        """Advance all worlds by a time step. As with MuJoCo, derived fields then lag by that step.
+
+        Raises:
+            ArgumentError: A field of the model was written that has one value for all worlds, or that cannot differ.
+        """
+        self._model_bridge.check()
         with self.nan_guard.watch(self.data):
             self.worlds.step()
 

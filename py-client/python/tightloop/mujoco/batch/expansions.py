@@ -47,16 +47,22 @@ def is_visual(name: str) -> bool:
     return name.startswith(_VISUAL)
 
 
+def can_vary(name: str) -> bool:
+    """Whether a field may differ between simulations."""
+    return name in _VARYING
+
+
 class Expansions:
     """Arrays ``(num_sims, ...)`` of model fields.
 
     Args:
         model: The batch's own copy of the model.
         num_sims: Number of simulations.
+        instead: What the caller can do about a field that cannot differ, for errors.
     """
 
-    def __init__(self, model: Any, num_sims: int) -> None:
-        self._model, self._sims = model, num_sims
+    def __init__(self, model: Any, num_sims: int, instead: str = "make a Batch per value") -> None:
+        self._model, self._sims, self._instead = model, num_sims, instead
         self._arrays: dict[str, Array] = {}
         self._inertias = masses.Inertias(np.asarray(model.body_iquat))
 
@@ -103,7 +109,7 @@ class Expansions:
         if name in masses.FIELDS and (self._model.opt.density > 0.0 or self._model.opt.viscosity > 0.0):
             raise ArgumentError(
                 f"{name} cannot differ between simulations of a medium, which drags boxes of the model's masses; "
-                "set density and viscosity to 0, or make a Batch per value"
+                f"set density and viscosity to 0, or {self._instead}"
             )
         if name not in self._arrays:
             self._arrays[name] = np.repeat(template[None], self._sims, axis=0).astype(wanted)
@@ -224,5 +230,5 @@ class Expansions:
                 sim = ids[int(differs.argmax())]
                 raise ArgumentError(
                     f"sim {sim}: {name} differs from the model's; tightloop varies {', '.join(_VARYING)}, "
-                    "so make a Batch per value"
+                    f"so {self._instead}"
                 )
