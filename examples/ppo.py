@@ -175,7 +175,7 @@ class Trainer:
         """
         config, agent = self.config, self.agent
         sizes, rows = self._look_back(r)
-        std_old = torch.exp(agent.log_std.detach())
+        std_old, entropy = torch.exp(agent.log_std.detach()), config.entropy * (1.0 - config.anneal * progress)
         moved, losses = [], []
         for _ in range(config.epochs):
             order = torch.randperm(len(rows), generator=self.shuffle, device=self.device)
@@ -187,7 +187,7 @@ class Trainer:
                 better = torch.min(ratio * own, ratio.clamp(1.0 - config.clip, 1.0 + config.clip) * own)
                 clipped = value_old + (value - value_old).clamp(-config.clip, config.clip)
                 off = torch.max((value - target) ** 2, (clipped - target) ** 2).mean()
-                loss = off - (weight * better).mean() - config.entropy * agent.log_std.sum()
+                loss = off - (weight * better).mean() - entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)

@@ -18,7 +18,8 @@ class Config:
     gamma: float = 0.99  # what a reward is worth one step later
     lam: float = 0.95  # λ of the advantages
     clip: float = 0.2  # of the ratio of probabilities
-    entropy: float = 0.0  # weight of the entropy in the loss
+    entropy: float = 0.0  # weight of the entropy in the loss, at the start
+    anneal: bool = False  # whether it falls to 0 until the end
     lr: float = 1e-3  # learning rate at the start
     kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start
@@ -50,7 +51,7 @@ PRESETS = {
         5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
     ),
     "QuadrupedVelocityRough": Config(
-        60.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=120.0
+        30.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, anneal=True, kl=0.03, std=0.7, mirror=True, evaluate=120.0
     ),
     "HumanoidVelocityFlat": Config(
         20.0, 512, 16, epochs=2, gamma=0.99, entropy=0.004, kl=0.04, std=0.6, mirror=True, evaluate=60.0
