@@ -1,14 +1,14 @@
-"""The README's pictures of robots that walk: sixteen of them follow the same command.
+"""The pictures of robots that walk: sixteen of them follow the same command.
 
     pip install --no-deps mjlab==1.6.0
-    python docs/walking_picture.py [G1 | quadruped] [FILE]
+    python docs/walking_picture.py [quadruped | G1] [FILE]
 
 Runs a trained policy, draws on the CPU and writes an animated WebP; some minutes on two cores.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -93,8 +93,12 @@ def shot(robot: str) -> Shot:
 
 def main() -> None:
     """Draw and write."""
-    shown = shot(sys.argv[1] if len(sys.argv) > 1 else "quadruped")
-    path = Path(sys.argv[2]) if len(sys.argv) > 2 else ASSETS / shown.file
+    parser = argparse.ArgumentParser(description="Film robots that walk.")
+    parser.add_argument("robot", nargs="?", choices=("quadruped", "G1"), default="quadruped", help="which robot")
+    parser.add_argument("file", nargs="?", type=Path, help="where to, instead of docs/pages/assets")
+    args = parser.parse_args()
+    shown = shot(args.robot)
+    path = args.file or ASSETS / shown.file
     policy = onnxruntime.InferenceSession(TRAINED / shown.policy, providers=["CPUExecutionProvider"])
     envs = VectorEnv(shown.task, WORLDS, render_mode="rgb_array")
     try:

@@ -40,7 +40,10 @@ RUNS = OUT / "ddp"
 
 
 class Loss(nn.Module):
-    """The loss of a minibatch, as a module: `DistributedDataParallel` averages gradients of a module's forward."""
+    """The loss of a minibatch, as a module: `DistributedDataParallel` averages gradients of a module's forward.
+
+    The weight of the entropy stays the same, also with ``anneal`` in the preset.
+    """
 
     def __init__(self, agent: Agent, config: Config) -> None:
         super().__init__()

@@ -3,12 +3,13 @@
     pip install onnxruntime
     python -m benches policy_rollout
 
-The quadruped walks ahead by its trained policy, with 1, 64 and 1024 worlds on one thread. Sides take turns, and the
-fastest of their turns counts:
+The quadruped follows commands by its trained policy, with 1, 64 and 1024 worlds on one thread. Sides take turns, and
+the fastest of their turns counts:
 
 - `frames without a policy`: rollouts in which the targets are held, and the robot stands;
 - `rollout(policy=…)`: the same with the policy, which sees each frame in the daemon;
-- `VectorEnv and onnxruntime`: a loop of steps with the same policy, which computes rewards and ends of episodes, too.
+- `VectorEnv and onnxruntime`: a loop of a reset and steps with the same policy, which draws commands, and computes
+  rewards and ends of episodes, too.
 
 Writes benches/results/MACHINE/policy_rollout.csv.
 """

@@ -123,9 +123,13 @@ def main() -> None:
         if args.keep:
             keep(RUNS[name], args.seeds, args.out)
     goals = "; ".join(f"{name} error < {RUNS[name].error} m/s, falls < {RUNS[name].falls:.0%}" for name in args.runs)
-    write_results(
-        "training", rows, {"command": "python -m benches training", "cores": os.cpu_count() or 1, "goals": goals}
-    )
+    facts = {
+        "command": "python -m benches training",
+        "cores": os.cpu_count() or 1,
+        "seeds": ", ".join(map(str, args.seeds)),
+        "goals": goals,
+    }
+    write_results("training", rows, facts)
 
 
 if __name__ == "__main__":

@@ -18,8 +18,8 @@ class Config:
     gamma: float = 0.99  # what a reward is worth one step later
     lam: float = 0.95  # λ of the advantages
     clip: float = 0.2  # of the ratio of probabilities
-    entropy: float = 0.0  # weight of the entropy in the loss, at the start
-    anneal: bool = False  # whether it falls to 0 until the end
+    entropy: float = 0.0  # weight of the entropy in the loss
+    anneal: bool = False  # whether the weight of the entropy falls to 0 by the end of the run
     lr: float = 1e-3  # learning rate at the start
     kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
     std: float = 0.6  # standard deviation of actions at the start

@@ -38,7 +38,8 @@ def main() -> int:
 
     try:
         mjlab.install()
-        print("mjlab simulates with tightloop, on the CPU", file=sys.stderr)
+        if name in ("train", "play"):
+            print("mjlab simulates with tightloop, on the CPU", file=sys.stderr)
         sys.argv = [f"python -m tightloop.mjlab {name}", *rest]
         importlib.import_module(SCRIPTS[name]).main()
     except TightloopError as error:

@@ -64,9 +64,11 @@ class ModelBridge(bridges.WarpBridge):
         for (name, _), note in self._noted.items():
             if note.tensor._version == note.writes:
                 continue
-            if not torch.equal(note.tensor, note.start):
+            if not torch.equal(_rows(note.tensor), note.start):
                 cure = "set it in the config of the environment instead"
-                if can_vary(name):
+                if self._fields.tensor(name) is not None:
+                    cure = f"read sim.model.{name} again, which was expanded since"
+                elif can_vary(name):
                     cure = f'call sim.expand_model_fields(("{name}",)) before you write it'
                 raise ArgumentError(f"sim.model.{name} was written, but tightloop read it at the start alone; {cure}")
             note.writes = note.tensor._version
@@ -93,7 +95,7 @@ class Note:
     Attributes:
         tensor: The tensor.
         writes: How often it was written when it was compared last, as torch counts.
-        start: Its values at the start.
+        start: Its values at the start, one row if all worlds share it.
     """
 
     tensor: Any
@@ -105,4 +107,11 @@ def _note(noted: dict[tuple[str, int], Note], name: str, value: Any) -> None:
     """Note what was read, if it is a tensor that is new: a cleared cache makes others of the same memory."""
     if isinstance(value, bridges.TorchArray) and (name, id(value._tensor)) not in noted:
         tensor = value._tensor
-        noted[name, id(tensor)] = Note(tensor, tensor._version, tensor.clone())
+        before = [note.start for (other, _), note in noted.items() if other == name]
+        start = before[0] if before else _rows(tensor).clone()
+        noted[name, id(tensor)] = Note(tensor, 0 if before else tensor._version, start)
+
+
+def _rows(tensor: Any) -> Any:
+    """The rows of a tensor that are apart in memory."""
+    return tensor[:1] if tensor.ndim and tensor.stride(0) == 0 else tensor

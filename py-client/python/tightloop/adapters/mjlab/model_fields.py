@@ -44,7 +44,10 @@ class ModelFields:
         """Give a field a value per world; see `Expansions.get`. One that has some keeps them."""
         if name in self._tensors:
             return
-        dtype = np.float32 if np.asarray(self._expansions.of(name)).dtype == np.float64 else None
+        values = self._expansions.of(name)
+        # constants that were computed for each world have their type already
+        is_new = name not in self._expansions.names
+        dtype = np.float32 if is_new and values.dtype == np.float64 else values.dtype
         # a tensor of inference would not count its writes
         with torch.inference_mode(False):
             self._tensors[name] = torch.from_numpy(self._expansions.get(name, dtype))
