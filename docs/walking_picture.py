@@ -108,10 +108,8 @@ def main() -> None:
         images = []
         for step in range(STEPS):
             if step % EVERY == 0:
-                middle = (*envs.frame.joint_q[:, :2].mean(axis=0), 0.0)
-                eye, aim = (
-                    tuple(float(a + b) for a, b in zip(middle, off, strict=True)) for off in (shown.eye, shown.aim)
-                )
+                x, y = (float(value) for value in envs.frame.joint_q[:, :2].mean(axis=0))
+                eye, aim = ((x + off[0], y + off[1], off[2]) for off in (shown.eye, shown.aim))
                 images.append(Image.fromarray(picture.render(envs.frame, camera=Camera(eye, aim, 0.7), contacts=False)))
             obs, *_ = envs.step(np.asarray(policy.run(["action"], {"obs": obs})[0]))
     finally:
