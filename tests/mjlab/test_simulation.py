@@ -257,6 +257,22 @@ def test_a_write_that_does_not_reach_the_worlds_is_refused(name: str, cure: str,
         sim.step()
 
 
+@pytest.mark.parametrize("worlds", [1, 4])
+def test_a_field_that_is_read_anew_is_compared_with_its_start(worlds: int, sim_of: Make) -> None:
+    sim = sim_of(worlds=worlds)
+    start = sim.model.body_mass[0].clone()
+    sim.model.body_mass[0] = 2.0 * start
+    sim.expand_model_fields(("geom_rgba",))  # makes new tensors of all fields
+    field = sim.model.body_mass
+    with pytest.raises(tl.ArgumentError, match=r"sim\.model\.body_mass was written"):
+        sim.step()
+    field[0] = start
+    sim.step()
+    field[0] = 3.0 * start
+    with pytest.raises(tl.ArgumentError, match=r"sim\.model\.body_mass was written"):
+        sim.step()
+
+
 def test_a_field_that_is_expanded_again_keeps_its_values(sim_of: Make) -> None:
     sim = sim_of()
     for _ in range(2):

@@ -109,7 +109,7 @@ def _note(noted: dict[tuple[str, int], Note], name: str, value: Any) -> None:
         tensor = value._tensor
         before = [note.start for (other, _), note in noted.items() if other == name]
         start = before[0] if before else _rows(tensor).clone()
-        noted[name, id(tensor)] = Note(tensor, 0 if before else tensor._version, start)
+        noted[name, id(tensor)] = Note(tensor, tensor._version, start)
 
 
 def _rows(tensor: Any) -> Any:
