@@ -19,6 +19,14 @@ pub enum IkError {
         /// The frame.
         name: String,
     },
+    /// An equality that is not kept.
+    #[error(
+        "the equality `{name}` is of a spatial tendon, which inverse kinematics does not keep; switch it off in the model, with active=\"false\""
+    )]
+    Tendon {
+        /// The equality.
+        name: String,
+    },
     /// The limits of joints that move together exclude each other.
     #[error(
         "the limits of `{leader}` and of `{follower}`, which follows it, exclude each other; widen one of them"

@@ -1,7 +1,8 @@
 //! Joints that follow others: mimic joints, and MuJoCo's equalities of joints; and the equalities that stay equations.
 
+use crate::error::IkError;
 use sim_model::Model;
-use sim_physics::constants::springs::Term;
+use sim_physics::constants::lengths::Term;
 use sim_physics::constants::ties::{Lengths, Measure, TieLaw};
 
 /// Where a leader without a range is looked for if its follower has one, and does not follow along a line [rad or m].
@@ -33,13 +34,16 @@ pub struct Couplings {
 
 impl Couplings {
     /// Those of a model, of equalities those that act at its start.
-    pub fn from_model(model: &Model) -> Couplings {
+    ///
+    /// # Errors
+    /// An equality of spatial tendons.
+    pub fn from_model(model: &Model) -> Result<Couplings, IkError> {
         let m = model.constants();
         let mut couplings = Couplings::default();
         for equality in &m.equalities {
             couplings.add(Lengths {
-                first: vec![term(equality.follower)],
-                second: vec![term(equality.leader)],
+                first: vec![term(equality.follower)].into(),
+                second: vec![term(equality.leader)].into(),
                 offsets: [0.0; 2],
                 polynomial: [equality.offset, equality.multiplier, 0.0, 0.0, 0.0],
                 referred: [None; 2],
@@ -52,20 +56,24 @@ impl Couplings {
             if let (Measure::Lengths(lengths), true) =
                 (&tie.measure, model.start().eq_active[place] != 0.0)
             {
+                if lengths.first.tendon.or(lengths.second.tendon).is_some() {
+                    let name = model.equality_names()[place].clone();
+                    return Err(IkError::Tendon { name });
+                }
                 couplings.add(lengths.clone());
             }
         }
         couplings.sort();
-        couplings
+        Ok(couplings)
     }
 
     /// Adds an equality: as a relation, unless its joint follows another one already or leads its own leader.
     fn add(&mut self, lengths: Lengths<f64>) {
-        let ([first], true) = (&lengths.first[..], lengths.second.len() <= 1) else {
+        let ([first], true) = (&lengths.first.terms[..], lengths.second.terms.len() <= 1) else {
             self.lengths.push(lengths);
             return;
         };
-        let leader = lengths.second.first();
+        let leader = lengths.second.terms.first();
         let follows = |dof| self.relations.iter().find(|r| r.follower == dof);
         let mut ahead = leader.map(|leader| leader.dof);
         while let Some(dof) = ahead.filter(|&dof| dof != first.dof) {

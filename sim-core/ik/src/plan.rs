@@ -84,7 +84,7 @@ impl Plan {
         let of_joint = |dof: usize| m.bodies[m.dofs[dof].body].dofs();
         let all = |dof: usize| of_joint(dof).all(|dof| task.moves[dof]);
         let moves: Vec<bool> = (0..m.dofs.len()).map(all).collect();
-        let mut couplings = Couplings::from_model(model);
+        let mut couplings = Couplings::from_model(model)?;
         let mut closures = closures(model);
         let columns_of = |reach: &Reach| {
             let other = reach.relative_to.as_ref().and_then(|other| other.body);
@@ -245,7 +245,7 @@ fn root_motion(bodies: &[Body<f64>], body: Option<usize>) -> Option<Motion> {
 
 /// Dofs of an equality of lengths.
 fn dofs_of(lengths: &Lengths<f64>) -> impl Iterator<Item = usize> + '_ {
-    let both = lengths.first.iter().chain(&lengths.second);
+    let both = lengths.first.terms.iter().chain(&lengths.second.terms);
     both.map(|term| term.dof)
 }
 

@@ -316,12 +316,12 @@ fn length_table<R: Real>(
     lengths: &Lengths<f64>,
     slope_of: &impl Fn(usize) -> Option<usize>,
 ) -> LengthTable<R> {
-    let both = || lengths.first.iter().chain(&lengths.second);
+    let both = || lengths.first.terms.iter().chain(&lengths.second.terms);
     let mut variables: Vec<usize> = both().filter_map(|t| plan.variable_of[t.dof]).collect();
     variables.sort_unstable();
     variables.dedup();
-    let terms = [&lengths.first, &lengths.second].map(|terms| {
-        let terms = terms.iter().map(|term| TermTable {
+    let terms = [&lengths.first, &lengths.second].map(|length| {
+        let terms = length.terms.iter().map(|term| TermTable {
             coord: model.constants().dofs[term.dof].coord,
             column: plan.variable_of[term.dof].and_then(|v| variables.binary_search(&v).ok()),
             slope: slope_of(term.dof),

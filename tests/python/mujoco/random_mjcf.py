@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import random_tendons
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,9 @@ class Features:
     transmissions: bool = False
     """Actuators on balls, free joints and sites."""
     tendons: bool = False
+    spatial: bool = False
+    """Tendons from site to site, around spheres and cylinders."""
+    muscles: bool = False
     pulls: bool = False
     """Springs, dampers, limits, dry friction and equalities of tendons."""
     compensation: bool = False
@@ -70,6 +74,8 @@ EVERYTHING = replace(
     polynomials=True,
     activations=True,
     transmissions=True,
+    spatial=True,
+    muscles=True,
     mocap=True,
     compensation=True,
     option=MEDIUM,
@@ -119,7 +125,8 @@ class _Model:
         return f"""<mujoco>
 <compiler angle="radian" autolimits="true"/>
 <option {f.option}><flag {f.flag}/></option>
-<worldbody>{'<geom name="floor" type="plane" size="5 5 .1" pos="0 0 -1"/>' if f.geoms else ""}{trees}</worldbody>
+<worldbody>{self.bend(0)}
+{'<geom name="floor" type="plane" size="5 5 .1" pos="0 0 -1"/>' if f.geoms else ""}{trees}</worldbody>
 {self.tendons()}{self.equalities()}{self.actuators()}{self.pairs()}
 </mujoco>"""
 
@@ -156,7 +163,15 @@ class _Model:
         name = f'name="b{self.bodies}"'
         site = f'<site name="s{self.bodies}" pos="{self.numbers(3, -0.2, 0.2)}" quat="{self.numbers(4)}"/>'
         name += self.compensation()
-        return f"<body {name} {pose}>{joints}{inertial}{site}{self.geom()}{inside}</body>"
+        bend = self.bend(self.bodies)
+        return f"<body {name} {pose}>{joints}{inertial}{site}{bend}{self.geom()}{inside}</body>"
+
+    def bend(self, body: int) -> str:
+        """What tendons bend around on a body, and a site on the world, which has no other."""
+        if not self.features.spatial:
+            return ""
+        site = "" if body else f'<site name="s0" pos="{self.numbers(3, -0.5, 0.5)}"/>'
+        return site + random_tendons.shape(self.rng, self.numbers, str(body))
 
     def _next(self) -> int:
         self.joints += 1
@@ -258,27 +273,28 @@ class _Model:
         return text + "/>"
 
     def tendons(self) -> str:
-        if not self.features.tendons or len(self.scalars) < 2:
-            return ""
         text = ""
-        for k in range(2):
+        for k in range(2 if self.features.tendons and len(self.scalars) >= 2 else 0):
             own = self.rng.choice(self.scalars, min(len(self.scalars), 2 + k), replace=False)
             terms = "".join(f'<joint joint="{name}" coef="{self.rng.uniform(-1, 1):.17g}"/>' for name in own)
             text += f'<fixed name="t{k}" {self.pulls()}>{terms}</fixed>'
+        for k in range(2 if self.features.spatial else 0):
+            path = random_tendons.path(self.rng, self.bodies + 1)
+            text += f'<spatial name="p{k}" {self.pulls(1.0)}>{path}</spatial>'
         return f"<tendon>{text}</tendon>"
 
-    def pulls(self) -> str:
-        """What acts along a tendon."""
+    def pulls(self, length: float = 0.0) -> str:
+        """What acts along a tendon of about this length."""
         text, rng = "", self.rng
         if self.features.actuators and self.has("bounds"):
             text += 'actuatorfrcrange="-0.6 0.9" '
         if self.has("pulls"):
             text += f'stiffness="{rng.uniform(0.5, 20):.17g}" damping="{rng.uniform(0.05, 2):.17g}" '
         if self.has("pulls"):
-            low, high = np.sort(rng.uniform(-0.5, 0.5, 2))
+            low, high = length + np.sort(rng.uniform(-0.5, 0.5, 2))
             text += f'springlength="{low:.17g} {high:.17g}" '
         if self.has("pulls"):
-            low, high = np.sort(rng.uniform(-0.4, 0.4, 2))
+            low, high = length + np.sort(rng.uniform(-0.4, 0.4, 2))
             text += f'range="{low:.17g} {high:.17g}" margin="{rng.choice([0.0, 0.3])}" '
             text += self.softness(("solreflimit", "solimplimit"))
         if self.has("pulls"):
@@ -295,9 +311,13 @@ class _Model:
             first, second = rng.choice(self.scalars, 2, replace=False)
             other = f'joint2="{second}"' if rng.random() < 0.7 else ""
             text += f'<joint joint1="{first}" {other} polycoef="{self.numbers(5, -0.5, 0.5)}" {self.equality()}/>'
-        if self.features.pulls and len(self.scalars) >= 2:
+        if self.features.pulls and self.features.tendons and len(self.scalars) >= 2:
             other = 'tendon2="t1"' if rng.random() < 0.7 else ""
             text += f'<tendon tendon1="t0" {other} polycoef="{self.numbers(5, -0.5, 0.5)}" {self.equality()}/>'
+        if self.features.pulls and self.features.spatial:
+            other = 'tendon2="p1"' if rng.random() < 0.7 else ""
+            line = f'polycoef="{rng.uniform(-0.1, 0.1):.17g} {rng.uniform(-1, 1):.17g} 0 0 0"'
+            text += f'<tendon tendon1="p0" {other} {line} {self.equality()}/>'
         if self.has("connections", 0.7):
             text += self.connection("connect") + self.connection("weld")
         if self.features.mocap:
@@ -330,6 +350,8 @@ class _Model:
         if self.features.tendons and len(self.scalars) >= 2:
             tendons = [f"t{k}" for k in range(2)] * (2 if self.features.bounds else 1)
             targets += [f'tendon="{name}" gear="{self.numbers(1, -3, 3)}"' for name in tendons]
+        if self.features.spatial:
+            targets += [f'tendon="p{k}" gear="{self.numbers(1, -3, 3)}"' for k in range(2)]
         if self.features.transmissions:
             targets += self.transmissions()
         for target in targets:
@@ -338,6 +360,9 @@ class _Model:
                 bounds += ' ctrlrange="-0.5 0.8"'
             if self.has("bounds"):
                 bounds += ' forcerange="-1 1.5"'
+            if target.startswith(("joint", "tendon")) and self.has("muscles"):
+                text += random_tendons.muscle(rng, target, bounds)
+                continue
             if self.has("activations", 0.7):
                 text += self.with_activation(target, bounds)
                 continue
@@ -367,6 +392,10 @@ class _Model:
             first, second = self.rng.integers(1, self.bodies + 1, 2)
             other = f'refsite="s{second}"' if self.rng.random() < 0.6 else ""
             targets.append(f'site="s{first}" {other} gear="{self.numbers(6, -1, 1)}"')
+        if self.bodies > 1:
+            first, second = self.rng.choice(self.bodies, 2, replace=False) + 1
+            rod = f'cranklength="{self.rng.uniform(0.3, 2):.17g}"'
+            targets.append(f'slidersite="s{first}" cranksite="s{second}" {rod} gear="{self.numbers(1, -1, 1)}"')
         return targets
 
     def with_activation(self, target: str, bounds: str) -> str:

@@ -26,13 +26,13 @@ MODEL = {
         ten_J_* mesh_graph* mesh_poly* mesh_extrema mesh_pos mesh_quat mesh_scale geom_aabb geom_rbound""",
     "derived from what is read": """body_rootid body_jntadr body_jntnum body_dofadr body_dofnum body_geomadr
         body_geomnum body_subtreemass body_contype body_conaffinity body_margin dof_bodyid dof_jntid dof_parentid
-        dof_Madr dof_M0 jnt_actuatorid tendon_actuatorid tendon_type pair_signature actuator_acc0 actuator_length0
+        dof_Madr dof_M0 jnt_actuatorid tendon_actuatorid tendon_type pair_signature actuator_length0
         actuator_ctrladr actuator_outadr flg_adhesion flg_gravcomp flg_surfacevel sensor_needstage""",
     "no effect in a step": "sensor_noise",
     "refused with flexes (nflex)": "flex*",
     "refused with plugins (nplugin)": "plugin* *_plugin",
     "of pictures of height fields": "hfield_pathadr",
-    "refused with actuators of those laws": "actuator_cranklength actuator_ctrlspec actuator_lengthrange",
+    "refused with actuators of those laws": "actuator_ctrlspec",
     "refused with delays": "actuator_history* sensor_history*",
     "refused with the flag for sleep": "tree_sleep_policy dof_length",
     "refused with plastic springs": "jnt_plasticadr tendon_plasticadr key_plastic",

@@ -54,6 +54,7 @@ _ARRAYS = """
     actuator_forcerange actuator_actlimited actuator_actrange actuator_actadr actuator_actnum actuator_actearly
     actuator_dynprm actuator_group jnt_actgravcomp body_mocapid pair_dim pair_geom1 pair_geom2 pair_solref
     pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
+    actuator_lengthrange actuator_acc0 actuator_cranklength
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
     cam_bodyid cam_pos cam_quat geom_group geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
     sensor_refid sensor_cutoff

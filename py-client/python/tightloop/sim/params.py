@@ -50,8 +50,8 @@ class Params:
     Of MuJoCo models: ``joint_ref`` (worlds, dofs) [rad or m] is ``qpos0`` of hinges and slides. ``body_gravcomp``
     (worlds, bodies) [–]. ``shape_mu_torsional`` and ``shape_mu_rolling`` (worlds, shapes) [m]. ``pair_friction``
     (worlds, contact_pairs, 3) [–, m, m] is sliding, torsional and rolling. ``actuator_gain`` and ``actuator_bias``
-    (worlds, actuators, 3) are constant, factor of the length and factor of the velocity. ``actuator_forcerange``
-    (worlds, actuators, 2) [N or N·m] acts where an actuator has bounds.
+    (worlds, actuators, 3) are constant, factor of the length and factor of the velocity; muscles keep their own.
+    ``actuator_forcerange`` (worlds, actuators, 2) [N or N·m] acts where an actuator has bounds.
 
     ``command_delay`` (worlds,) [substeps]: delay until ``joint_f`` and targets of a frame act, rounded up to whole
     substeps; at most ``Scene.command_delay_max``.

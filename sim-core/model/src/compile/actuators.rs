@@ -3,19 +3,21 @@
 use super::carrier::Carrier;
 use super::contacts::clusters::path;
 use super::sites::mounted;
-use super::ties::terms;
-use crate::description::{self, ActuatorActivation, ActuatorLength};
+use super::tendons::Lengths;
+use crate::description::{self, ActuatorActivation, ActuatorLength, Precompiled};
 use crate::pose::Pose;
 use sim_physics::constants::Body;
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, Actuators, LengthKind, Sites, TurningLength,
+    Activation, ActivationRate, Actuator, Actuators, LengthKind, Sites, SliderCrank, TendonBound,
+    TurningLength,
 };
-use sim_physics::constants::springs::Term;
+use sim_physics::constants::lengths::Term;
+use sim_physics::constants::site::Mount;
 
 /// What an actuator refers to.
 pub(super) struct Scene<'a> {
-    /// The first dof of each joint of the robot.
-    pub dof_of: &'a [usize],
+    /// Dofs and tendons of the robot.
+    pub lengths: Lengths<'a>,
     /// An entry for each of its links.
     pub carriers: &'a [Carrier],
     pub bodies: &'a [Body<f64>],
@@ -38,7 +40,20 @@ pub(super) fn add(to: &mut Actuators<f64>, actuator: &description::Actuator, sce
         force_range: actuator.force_range,
         gain: actuator.gain,
         bias: actuator.bias,
+        muscle_gain: actuator.muscle_gain.clone(),
+        muscle_bias: actuator.muscle_bias.clone(),
     });
+}
+
+/// Adds bounds along tendons of a robot, whose actuators are not there yet.
+pub(super) fn add_tendon_bounds(to: &mut Actuators<f64>, parts: &Precompiled) {
+    let first = to.all.len();
+    for (actuators, range) in &parts.tendon_bounds {
+        to.tendon_bounds.push(TendonBound {
+            actuators: actuators.iter().map(|k| first + k).collect(),
+            range: *range,
+        });
+    }
 }
 
 /// Moments of the actuators so far.
@@ -76,7 +91,7 @@ fn length(length: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
     // forces of free joints are in the axes of the model's world, which is link 0
     let placed = |v: [f64; 3]| scene.carriers[0].pose.rotate(v);
     let turning = match length {
-        ActuatorLength::Joints(joints) => return (terms(joints, scene.dof_of), None),
+        ActuatorLength::Joints(joints) => return (scene.lengths.terms(joints), None),
         ActuatorLength::Ball {
             joint,
             gear: [x, y, z],
@@ -107,35 +122,68 @@ fn length(length: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
             let dofs = scene.bodies[body].dofs().collect();
             turning(kind, [x, y, z, u, v, w], dofs)
         }
+        &ActuatorLength::Tendon { tendon, gear } => {
+            let tendon = scene.lengths.first_tendon + tendon;
+            let dofs = scene.lengths.tendons[tendon].dofs.clone();
+            let kind = LengthKind::Tendon(tendon);
+            turning(kind, [gear, 0.0, 0.0, 0.0, 0.0, 0.0], dofs)
+        }
+        ActuatorLength::SliderCrank {
+            slider,
+            crank,
+            rod,
+            gear,
+        } => {
+            let (slider, crank) = (scene.mount(slider), scene.mount(crank));
+            let dofs = dofs_between(scene, slider.body, crank.body);
+            let kind = LengthKind::SliderCrank(SliderCrank {
+                slider,
+                crank,
+                rod: *rod,
+            });
+            turning(kind, [*gear, 0.0, 0.0, 0.0, 0.0, 0.0], dofs)
+        }
         ActuatorLength::Site {
             site,
             reference,
             gear,
         } => {
-            let mount = |(link, pose): &(usize, Pose)| {
-                let carrier = &scene.carriers[*link];
-                let pose = carrier.pose.mul(pose);
-                mounted(carrier.body, Some(carrier.tree), &pose)
-            };
-            let (site, reference) = (mount(site), reference.as_ref().map(mount));
-            let moved = |body: Option<usize>| {
-                let dofs = body.map(|body| path(scene.bodies, body));
-                dofs.into_iter().flatten().collect::<Vec<_>>()
-            };
-            let site_dofs = moved(site.body);
-            let other = moved(reference.as_ref().and_then(|mount| mount.body));
-            let mut dofs: Vec<usize> = site_dofs.iter().chain(&other).copied().collect();
-            dofs.retain(|dof| site_dofs.contains(dof) != other.contains(dof));
-            dofs.sort_unstable();
+            let (site, reference) = (
+                scene.mount(site),
+                reference.as_ref().map(|r| scene.mount(r)),
+            );
+            let other = reference.as_ref().and_then(|mount| mount.body);
+            let dofs = dofs_between(scene, site.body, other);
             turning(LengthKind::Site(Sites { site, reference }), *gear, dofs)
         }
     };
     (Vec::new(), Some(turning))
 }
 
+impl Scene<'_> {
+    /// A site by its link and its frame there.
+    fn mount(&self, (link, pose): &(usize, Pose)) -> Mount<f64> {
+        let carrier = &self.carriers[*link];
+        mounted(carrier.body, Some(carrier.tree), &carrier.pose.mul(pose))
+    }
+}
+
+/// The dofs that move one body against another, rising.
+fn dofs_between(scene: &Scene<'_>, body: Option<usize>, other: Option<usize>) -> Vec<usize> {
+    let moved = |body: Option<usize>| {
+        let dofs = body.map(|body| path(scene.bodies, body));
+        dofs.into_iter().flatten().collect::<Vec<_>>()
+    };
+    let (first, second) = (moved(body), moved(other));
+    let mut dofs: Vec<usize> = first.iter().chain(&second).copied().collect();
+    dofs.retain(|dof| first.contains(dof) != second.contains(dof));
+    dofs.sort_unstable();
+    dofs
+}
+
 /// The body that a joint moves.
 fn body_of(scene: &Scene<'_>, joint: usize) -> usize {
-    let dof = scene.dof_of[joint];
+    let dof = scene.lengths.dof_of[joint];
     let body = scene
         .bodies
         .iter()

@@ -4,18 +4,20 @@ use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofJoint, SoftJoint};
 use super::output_frames::add_frames;
-use super::ties::{DofConstraint, terms};
+use super::tendons::{Lengths, add_tendons};
+use super::ties::DofConstraint;
 use crate::description::{Description, Joint, JointExtras, Precompiled, Robot, TargetMode};
 use crate::inertia::{Inertial, merge};
 use crate::joint_kind::JointKind;
 use crate::model::{RobotRange, SensorInfo, Start};
 use crate::pose::Pose;
-use sim_physics::constants::actuators::{ActuatorBound, Actuators, TendonBound};
+use sim_physics::constants::actuators::{ActuatorBound, Actuators};
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::params::Param;
 use sim_physics::constants::passive::{Drag, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
-use sim_physics::constants::springs::{Springs, Tendon};
+use sim_physics::constants::springs::Springs;
+use sim_physics::constants::tendons::SpatialTendon;
 use sim_physics::constants::{Body, Dof, Frame, MassEntry, Motion, Tree};
 use sim_physics::math::factor::Pattern;
 
@@ -33,6 +35,7 @@ pub(super) struct BodyBuilder {
     pub coord_names: Vec<String>,
     pub body_names: Vec<String>,
     pub start: Start,
+    pub tendons: Vec<SpatialTendon<f64>>,
     pub springs: Springs<f64>,
     pub free_joints: Vec<usize>,
     pub drags: Vec<Drag<f64>>,
@@ -334,10 +337,18 @@ impl BodyBuilder {
         self.add_compensations(robot, parts, carriers);
         self.add_drags(parts, carriers);
         let first_equality = self.switches;
+        let first_tendon = self.tendons.len();
+        let described = &parts.spatial_tendons;
+        add_tendons(&mut self.tendons, described, carriers, &self.bodies);
+        let lengths = Lengths {
+            dof_of,
+            tendons: &self.tendons,
+            first_tendon,
+        };
         for constraint in &parts.constraints {
             let compiled = DofConstraint::new(
                 constraint,
-                dof_of,
+                &lengths,
                 carriers,
                 &self.bodies,
                 first_body,
@@ -355,26 +366,14 @@ impl BodyBuilder {
             self.equality_names.push(format!("{}/{name}", robot.name));
             self.start.eq_active.push(f64::from(u8::from(*is_active)));
         }
-        for tendon in &parts.tendons {
-            self.springs.tendons.push(Tendon {
-                terms: terms(&tendon.terms, dof_of),
-                stiffness: tendon.stiffness,
-                rest: tendon.rest,
-                damping: tendon.damping,
-            });
-        }
-        let first = self.actuators.all.len();
-        for (actuators, range) in &parts.tendon_bounds {
-            self.actuators.tendon_bounds.push(TendonBound {
-                actuators: actuators.iter().map(|k| first + k).collect(),
-                range: *range,
-            });
-        }
+        let springs = parts.tendons.iter().map(|tendon| lengths.spring(tendon));
+        self.springs.tendons.extend(springs);
+        actuators::add_tendon_bounds(&mut self.actuators, parts);
         for actuator in &parts.actuators {
             self.actuator_names
                 .push(format!("{}/{}", robot.name, actuator.name));
             let scene = actuators::Scene {
-                dof_of,
+                lengths,
                 carriers,
                 bodies: &self.bodies,
                 dt: self.dt,
@@ -385,7 +384,7 @@ impl BodyBuilder {
             robot,
             dof_of,
             carriers,
-            [first_body, first_actuator, first_constraint],
+            [first_body, first_actuator, first_constraint, first_tendon],
         );
     }
 

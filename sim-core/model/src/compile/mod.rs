@@ -22,6 +22,7 @@ mod scans;
 mod sensors;
 mod sites;
 mod solver;
+mod tendons;
 mod ties;
 
 use crate::description::Description;
@@ -141,6 +142,7 @@ fn bodies_alone(
         delay: Delay::default(),
         scans: Vec::new(),
         integrator: Integrator::default(),
+        tendons: Vec::new(),
         springs: Springs::default(),
         free_joints: Vec::new(),
         solved_bodies: Vec::new(),
@@ -159,6 +161,7 @@ fn bodies_alone(
 
 /// What acts on the bodies besides gravity, commands and constraints, and what is measured of them.
 fn add_forces(m: &mut Constants<f64>, scene: &Description, builder: &mut BodyBuilder) {
+    m.tendons = std::mem::take(&mut builder.tendons);
     m.springs = std::mem::take(&mut builder.springs);
     m.free_joints = std::mem::take(&mut builder.free_joints);
     m.drags = std::mem::take(&mut builder.drags);

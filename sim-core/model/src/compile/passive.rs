@@ -125,8 +125,13 @@ pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
     let varies = varies.iter().any(|param| scene.params.contains(param));
     let actuators = &m.actuators.all;
     let damped = (0..actuators.len()).filter(|&k| {
-        let Actuator { gain, bias, .. } = &actuators[k];
-        varies || gain[2] != 0.0 || bias[2] != 0.0
+        let Actuator {
+            gain,
+            bias,
+            muscle_gain,
+            ..
+        } = &actuators[k];
+        varies || gain[2] != 0.0 || bias[2] != 0.0 || muscle_gain.is_some()
     });
     m.actuators.damped = damped.collect();
     if m.integrator != Integrator::ImplicitFast {
@@ -134,7 +139,11 @@ pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
     }
     let damped = m.actuators.damped.iter().map(|&k| &m.actuators.all[k]);
     let turning = damped.flat_map(|actuator| &actuator.turning);
-    let driven: Vec<usize> = turning.flat_map(|length| length.dofs.clone()).collect();
+    let mut driven: Vec<usize> = turning.flat_map(|length| length.dofs.clone()).collect();
+    let dampers = m.springs.tendons.iter();
+    let damped = dampers.filter(|tendon| tendon.damping != 0.0);
+    let spatial = damped.filter_map(|tendon| tendon.length.tendon);
+    driven.extend(spatial.flat_map(|tendon| m.tendons[tendon].dofs.clone()));
     let is_solved = |body: &usize| {
         m.free_joints.contains(body)
             || m.drags.iter().any(|drag| drag.body == *body)

@@ -3,7 +3,7 @@
 use super::bodies::BodyBuilder;
 use super::carrier::Carrier;
 use super::output_frames::mounted_on;
-use super::ties::terms;
+use super::tendons::Lengths;
 use crate::description::{Robot, Sense, SensorParts, ZonePart};
 use crate::model::SensorInfo;
 use sim_physics::constants::outputs::OutputFrames;
@@ -18,6 +18,8 @@ use sim_physics::constants::{Dof, Tree};
 struct Scope<'a> {
     /// The first dof of each joint of the robot.
     dof_of: &'a [usize],
+    /// Its dofs and tendons.
+    lengths: Lengths<'a>,
     /// Of each link of the robot.
     carriers: &'a [Carrier],
     /// The link that each is welded to, or itself.
@@ -36,13 +38,13 @@ struct Scope<'a> {
 }
 
 impl BodyBuilder {
-    /// Adds the sensors of a robot whose first body, actuator and constraint are given.
+    /// Adds the sensors of a robot whose first body, actuator, constraint and tendon are given.
     pub(super) fn add_sensors(
         &mut self,
         robot: &Robot,
         dof_of: &[usize],
         carriers: &[Carrier],
-        [first_body, first_actuator, first_constraint]: [usize; 3],
+        [first_body, first_actuator, first_constraint, first_tendon]: [usize; 4],
     ) {
         let Some(parts) = &robot.precompiled else {
             return;
@@ -58,6 +60,11 @@ impl BodyBuilder {
             .extend(refused.map(|what| format!("model `{}`: {what}", robot.name)));
         let scope = Scope {
             dof_of,
+            lengths: Lengths {
+                dof_of,
+                tendons: &self.tendons,
+                first_tendon,
+            },
             carriers,
             welds: &parts.welds,
             dofs: &self.dofs,
@@ -102,12 +109,9 @@ impl Scope<'_> {
         let mount = |on| mounted_on(self.carriers, on);
         match sense {
             Sense::Vector(site, vector) => SensorKind::Vector(mount(site), *vector),
-            Sense::Length {
-                terms: length_terms,
-                is_rate,
-            } => match is_rate {
-                true => SensorKind::Rate(terms(length_terms, self.dof_of)),
-                false => SensorKind::Length(terms(length_terms, self.dof_of)),
+            Sense::Length { of, is_rate } => match is_rate {
+                true => SensorKind::Rate(self.lengths.length(of)),
+                false => SensorKind::Length(self.lengths.length(of)),
             },
             Sense::Actuator { actuator, is_rate } => match is_rate {
                 true => SensorKind::ActuatorRate(self.first_actuator + actuator),

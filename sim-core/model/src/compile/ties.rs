@@ -4,9 +4,9 @@ use super::carrier::Carrier;
 use super::constraint_rows::own_soft;
 use super::contacts::clusters::path;
 use super::sites::mounted;
+use super::tendons::Lengths;
 use crate::description::{Constraint, ConstraintLaw, Measure};
-use sim_physics::constants::springs::Term;
-use sim_physics::constants::ties::{self, Frames, Lengths, Tie, TieLaw};
+use sim_physics::constants::ties::{self, Frames, Tie, TieLaw};
 use sim_physics::constants::{Body, Constants, FAR, Motion};
 
 /// Smallest inverse weight of a row (MuJoCo: `mjMINVAL`).
@@ -26,11 +26,11 @@ pub(super) struct DofConstraint {
 }
 
 impl DofConstraint {
-    /// `dof_of` has the first dof of each joint of the robot, `carriers` an entry for each of its links. `first_body` is the
+    /// `lengths` has the dofs and tendons of the robot, `carriers` an entry for each of its links. `first_body` is the
     /// first of its bodies among those of MuJoCo models, and `first_equality` of its equalities.
     pub fn new(
         constraint: &Constraint,
-        dof_of: &[usize],
+        lengths: &Lengths<'_>,
         carriers: &[Carrier],
         bodies: &[Body<f64>],
         first_body: usize,
@@ -41,6 +41,7 @@ impl DofConstraint {
             let body = bodies.iter().position(|body| body.dofs().contains(&dof));
             body.expect("every dof has a body")
         };
+        let dof_of = lengths.dof_of;
         let (measure, mut dofs): (_, Vec<usize>) = match &constraint.measure {
             Measure::Lengths {
                 first,
@@ -49,16 +50,16 @@ impl DofConstraint {
                 polynomial,
                 referred,
             } => {
-                let lengths = Lengths {
-                    first: terms(first, dof_of),
-                    second: terms(second, dof_of),
+                let measured = ties::Lengths {
+                    first: lengths.length(first),
+                    second: lengths.length(second),
                     offsets: *offsets,
                     polynomial: *polynomial,
                     referred: referred.map(|joint| joint.map(|joint| dof_of[joint])),
                 };
-                let both = lengths.first.iter().chain(&lengths.second);
-                let dofs = both.map(|term| term.dof).collect();
-                (ties::Measure::Lengths(lengths), dofs)
+                let mut dofs = lengths.dofs(&measured.first);
+                dofs.extend(lengths.dofs(&measured.second));
+                (ties::Measure::Lengths(measured), dofs)
             }
             Measure::Angle { joint } => {
                 let body = &bodies[body_of(dof_of[*joint])];
@@ -111,15 +112,6 @@ impl DofConstraint {
         let rising = self.dofs.iter().enumerate();
         rising.flat_map(|(i, &dof)| self.dofs[..i].iter().map(move |&other| (dof, other)))
     }
-}
-
-/// Joints with one dof and their coefficients as dofs, each once.
-pub(super) fn terms(joints: &[(usize, f64)], dof_of: &[usize]) -> Vec<Term<f64>> {
-    let all = joints.iter().map(|&(joint, coefficient)| Term {
-        dof: dof_of[joint],
-        coefficient,
-    });
-    all.collect()
 }
 
 /// Adds the rows of constraints, after those of joints, and returns the constraint of each tie.

@@ -1,5 +1,6 @@
 //! Constraints of a robot that MuJoCo compiled, beyond limits and frictions of single dofs.
 
+use super::tendons::Length;
 use crate::pose::Pose;
 use crate::softness::Softness;
 
@@ -19,12 +20,12 @@ pub struct Constraint {
 /// What a constraint measures.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Measure {
-    /// l₁ - o₁ - p(l₂ - o₂), where l are sums of positions of joints with one dof times coefficients.
+    /// l₁ - o₁ - p(l₂ - o₂)
     Lengths {
-        /// Joints of l₁ and their coefficients.
-        first: Vec<(usize, f64)>,
-        /// Joints of l₂ and their coefficients.
-        second: Vec<(usize, f64)>,
+        /// l₁
+        first: Length,
+        /// l₂
+        second: Length,
         /// o₁ and o₂ [rad or m].
         offsets: [f64; 2],
         /// Coefficients of p, the constant first.
@@ -69,11 +70,11 @@ pub enum ConstraintLaw {
     },
 }
 
-/// A fixed tendon that acts as a spring and a damper.
+/// A tendon that acts as a spring and a damper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tendon {
-    /// Indices of joints with one dof, each with its coefficient.
-    pub terms: Vec<(usize, f64)>,
+    /// Its length.
+    pub length: Length,
     /// [N/m or N·m/rad]
     pub stiffness: f64,
     /// Lengths between which its spring has no force [m or rad].

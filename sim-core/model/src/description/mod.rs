@@ -13,6 +13,7 @@ mod robot;
 mod scene;
 mod sensors;
 mod shapes;
+mod tendons;
 
 pub(crate) use crate::geometry::Shape;
 pub(crate) use crate::inertia::Inertial;
@@ -35,3 +36,4 @@ pub use sensors::{
     ZoneKind, ZonePart,
 };
 pub(crate) use shapes::named;
+pub use tendons::{Length, Span, SpatialTendon, Wrap};

@@ -3,10 +3,11 @@
 use super::constraints::{Constraint, Tendon};
 use super::output_frames::FrameParts;
 use super::sensors::SensorParts;
+use super::tendons::SpatialTendon;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
-use sim_physics::constants::actuators::ActivationRate;
+use sim_physics::constants::actuators::{ActivationRate, Muscle};
 use sim_physics::constants::options::Integrator;
 
 /// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
@@ -28,6 +29,8 @@ pub struct Precompiled {
     pub drags: Vec<Drag>,
     /// Links that are held against gravity, each with its share of compensation; none where the model has no passive forces.
     pub compensations: Option<Vec<(usize, f64)>>,
+    /// Spatial tendons that are measured or that act.
+    pub spatial_tendons: Vec<SpatialTendon>,
     /// Springs and dampers of tendons.
     pub tendons: Vec<Tendon>,
     /// Actuators.
@@ -148,6 +151,10 @@ pub struct Actuator {
     pub gain: [f64; 3],
     /// A constant, and factors of length and velocity.
     pub bias: [f64; 3],
+    /// In place of that gain, a muscle's.
+    pub muscle_gain: Option<Muscle<f64>>,
+    /// In place of that bias, a muscle's.
+    pub muscle_bias: Option<Muscle<f64>>,
 }
 
 /// Along which an actuator acts.
@@ -172,6 +179,24 @@ pub enum ActuatorLength {
         gear: [f64; 6],
         /// Whether the torque is in those axes too, instead of those of the link.
         in_parent: bool,
+    },
+    /// A spatial tendon.
+    Tendon {
+        /// Its place in [`Precompiled::spatial_tendons`].
+        tendon: usize,
+        /// What its length is multiplied with.
+        gear: f64,
+    },
+    /// A rod from a slider to a crank.
+    SliderCrank {
+        /// The site along whose z axis the slider moves: its link and its frame there.
+        slider: (usize, Pose),
+        /// The site on the crank.
+        crank: (usize, Pose),
+        /// How long the rod is [m].
+        rod: f64,
+        /// What the length is multiplied with.
+        gear: f64,
     },
     /// A site: its link and its frame there.
     Site {

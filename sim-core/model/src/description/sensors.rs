@@ -1,6 +1,7 @@
 //! Sensors of a robot that MuJoCo compiled.
 
 use super::output_frames::OnLink;
+use super::tendons::Length;
 pub use sim_physics::constants::sensors::{FramePart, LimitPart, Reduction, SubtreePart, ZoneKind};
 
 /// The sensors of a robot, in MuJoCo's order.
@@ -34,10 +35,10 @@ pub struct Sensor {
 pub enum Sense {
     /// A vector of the world in the axes of a frame.
     Vector(OnLink, [f64; 3]),
-    /// A sum of positions of joints with one dof times coefficients, or its rate of change.
+    /// A length, or its rate of change.
     Length {
-        /// Indices of joints, each with its coefficient.
-        terms: Vec<(usize, f64)>,
+        /// The length.
+        of: Length,
         /// Is it the rate of change?
         is_rate: bool,
     },

@@ -3,15 +3,17 @@
 //! The first release kept these constants together, for models from MuJoCo alone.
 
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, LengthKind, Sites, TendonBound,
-    TurningLength,
+    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, LengthKind, Muscle, MuscleRate,
+    Sites, SliderCrank, TendonBound, TurningLength,
 };
 use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
+use sim_physics::constants::lengths::{Length, Term};
 use sim_physics::constants::options::{Integrator, Search};
 use sim_physics::constants::outputs::{OutputBody, OutputFrames};
 use sim_physics::constants::passive::{Compensation, Drag, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
-use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon, Term};
+use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon};
+use sim_physics::constants::tendons::{Inner, Span, SpatialTendon, Wrap};
 use sim_physics::constants::ties::{Frames, Lengths, Measure, Tie, TieLaw};
 
 use sim_physics::constants::{Constants, Impedance};
@@ -30,6 +32,7 @@ pub(super) struct Additions<'a> {
     passive_dofs: &'a Vec<usize>,
     actuated_dofs: &'a Vec<usize>,
     tendons: &'a Vec<Tendon<f64>>,
+    spatial_tendons: &'a Vec<SpatialTendon<f64>>,
     ties: &'a Vec<Tie<f64>>,
     tie_of_row: &'a Vec<usize>,
     switches: usize,
@@ -74,6 +77,7 @@ impl Additions<'_> {
             sites: _,
             scans: _,
             integrator,
+            tendons: spatial_tendons,
             springs:
                 Springs {
                     joints,
@@ -125,6 +129,7 @@ impl Additions<'_> {
             passive_dofs,
             actuated_dofs,
             tendons,
+            spatial_tendons,
             ties,
             tie_of_row,
             switches: *switches,
@@ -171,7 +176,8 @@ view! {
             "sensors": sensors,
             "pair_bodies": pair_bodies,
             "class_bodies": class_bodies,
-        };
+        }
+        Later { "spatial_tendons": spatial_tendons };
     Spring<f64> as "Spring":
         Always { "dof": dof, "stiffness": stiffness, "rest": rest };
     PoseSpring<f64> as "PoseSpring":
@@ -188,7 +194,7 @@ view! {
     Compensation<f64> as "Compensation":
         Always { "body": body, "link": link, "mass": mass, "share": share, "center": center };
     Tendon<f64> as "Tendon":
-        Always { "terms": terms, "stiffness": stiffness, "rest": rest, "damping": damping };
+        Always { "terms": length, "stiffness": stiffness, "rest": rest, "damping": damping };
     Actuator<f64> as "Actuator":
         Always {
             "terms": terms,
@@ -198,6 +204,34 @@ view! {
             "force_range": force_range,
             "gain": gain,
             "bias": bias,
+        }
+        Later { "muscle_gain": muscle_gain, "muscle_bias": muscle_bias };
+    Muscle<f64> as "Muscle":
+        Always {
+            "peak": peak,
+            "shortest": shortest,
+            "l_shortest": l_shortest,
+            "inverse_optimum": inverse_optimum,
+            "inverse_speed": inverse_speed,
+            "l_min": l_min,
+            "l_max": l_max,
+            "fp_max": fp_max,
+            "fv_max": fv_max,
+        };
+    MuscleRate<f64> as "MuscleRate":
+        Always { "rise": rise, "fall": fall, "width": width };
+    SpatialTendon<f64> as "SpatialTendon":
+        Always { "spans": spans, "dofs": dofs }
+        => bodies, moved, first, free_bodies;
+    Span<f64> as "Span":
+        Always { "from": from, "to": to, "share": share, "wrap": wrap };
+    Wrap<f64> as "Wrap":
+        Always {
+            "at": at,
+            "is_cylinder": is_cylinder,
+            "radius": radius,
+            "side": side,
+            "inner": inner,
         };
     Term<f64> as "Term":
         Always { "dof": dof, "coefficient": coefficient };
@@ -215,6 +249,8 @@ view! {
         };
     TurningLength<f64> as "TurningLength":
         Always { "kind": kind, "gear": gear, "dofs": dofs, "first": first };
+    SliderCrank<f64> as "SliderCrank":
+        Always { "slider": slider, "crank": crank, "rod": rod };
     Sites<f64> as "Sites":
         Always { "site": site, "reference": reference };
     Tie<f64> as "Tie":
@@ -253,6 +289,7 @@ view! {
 }
 
 words! {
+    Inner: Never "Never", Always "Always", Sometimes "Sometimes";
     Integrator: ImplicitFast "ImplicitFast", Euler "Euler", RungeKutta "RungeKutta";
 }
 
@@ -267,6 +304,17 @@ impl View for ActivationRate<f64> {
             ActivationRate::Held => text.put("Held"),
             ActivationRate::Control => text.put("Control"),
             ActivationRate::Filter(time) => text.tuple("Filter", &[time]),
+            ActivationRate::Muscle(rate) => text.tuple("Muscle", &[rate]),
+        }
+    }
+}
+
+/// A length of joints alone is their list.
+impl View for Length<f64> {
+    fn write(&self, text: &mut Text) {
+        match &self.tendon {
+            Some(tendon) => text.tuple("Spatial", &[&self.terms, tendon]),
+            None => self.terms.write(text),
         }
     }
 }
@@ -277,6 +325,8 @@ impl View for LengthKind<f64> {
             LengthKind::Ball { coord, in_parent } => ("Ball", "coord", coord, in_parent),
             LengthKind::Free { body, in_parent } => ("Free", "body", body, in_parent),
             LengthKind::Site(sites) => return text.tuple("Site", &[sites]),
+            LengthKind::Tendon(tendon) => return text.tuple("Tendon", &[tendon]),
+            LengthKind::SliderCrank(crank) => return text.tuple("SliderCrank", &[crank]),
         };
         let values: [(&str, &dyn View); 2] = [(key, index), ("in_parent", in_parent)];
         text.groups(name, &[(When::Always, &values)]);

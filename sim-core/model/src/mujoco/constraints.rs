@@ -7,7 +7,7 @@ use super::options::has_flag;
 use super::tendons::{Tendons, moving};
 use super::tree::softness;
 use crate::description::{
-    Constraint, ConstraintLaw, JointKind, Measure, Precompiled, Robot, Tendon,
+    Constraint, ConstraintLaw, JointKind, Length, Measure, Precompiled, Robot, Tendon,
 };
 use crate::error::ModelError;
 use crate::pose::Pose;
@@ -31,7 +31,9 @@ pub(super) fn add_constraints(
     if is_on("mjDSBL_LIMIT")? {
         add_limits(file, robot, &tendons, parts)?;
     }
-    add_springs(file, &tendons, parts)
+    add_springs(file, &tendons, parts)?;
+    parts.spatial_tendons = tendons.spatial;
+    Ok(())
 }
 
 /// Names of all equalities, and whether they act at the start.
@@ -130,8 +132,8 @@ impl Equalities<'_> {
         }
         parts.constraints.push(Constraint {
             measure: Measure::Lengths {
-                first: vec![(follower, 1.0)],
-                second,
+                first: Length::Joints(vec![(follower, 1.0)]),
+                second: Length::Joints(second),
                 offsets: [offset, other],
                 polynomial,
                 referred: [Some(follower), leader],
@@ -148,14 +150,14 @@ impl Equalities<'_> {
         let count = self.tendons.names.len();
         let lengths = self.file.reals("tendon_length0", count)?;
         let weights = self.file.reals("tendon_invweight0", count)?;
-        let first = self.tendons.terms(self.file, self.firsts[k])?.to_vec();
+        let first = self.tendons.length(self.file, self.firsts[k])?.clone();
         let first_tendon = self.firsts[k] as usize;
         let [constant, rest @ ..] = self.data[k];
         let mut polynomial = [constant, 0.0, 0.0, 0.0, 0.0];
         let mut inverse_weight = weights[first_tendon];
-        let (mut second, mut other) = (Vec::new(), 0.0);
+        let (mut second, mut other) = (Length::Joints(Vec::new()), 0.0);
         if self.seconds[k] >= 0 {
-            second = self.tendons.terms(self.file, self.seconds[k])?.to_vec();
+            second = self.tendons.length(self.file, self.seconds[k])?.clone();
             other = lengths[self.seconds[k] as usize];
             inverse_weight += weights[self.seconds[k] as usize];
             polynomial[1..].copy_from_slice(&rest[..4]);
@@ -248,7 +250,7 @@ fn add_frictions(
     let weights = file.reals("tendon_invweight0", count)?;
     for k in (0..count).filter(|&k| losses[k] > 0.0) {
         parts.constraints.push(Constraint {
-            measure: length(tendons.terms(file, k as i64)?),
+            measure: length(tendons.length(file, k as i64)?),
             law: ConstraintLaw::Friction(losses[k]),
             softness: softness[k],
             inverse_weight: along(weights[k]),
@@ -293,7 +295,7 @@ fn add_limits(
     let weights = file.reals("tendon_invweight0", count)?;
     for k in (0..count).filter(|&k| limited[k] != 0) {
         parts.constraints.push(Constraint {
-            measure: length(tendons.terms(file, k as i64)?),
+            measure: length(tendons.length(file, k as i64)?),
             law: ConstraintLaw::Range {
                 bounds: ranges[k],
                 margin: margins[k],
@@ -323,7 +325,7 @@ fn add_springs(
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
     for k in (0..count).filter(|&k| stiffness[k] != 0.0 || damping[k] != 0.0) {
         parts.tendons.push(Tendon {
-            terms: tendons.terms(file, k as i64)?.to_vec(),
+            length: tendons.length(file, k as i64)?.clone(),
             stiffness: stiffness[k],
             rest: rests[k],
             damping: damping[k],
@@ -333,10 +335,10 @@ fn add_springs(
 }
 
 /// The length of a tendon.
-fn length(terms: &[(usize, f64)]) -> Measure {
+fn length(length: &Length) -> Measure {
     Measure::Lengths {
-        first: terms.to_vec(),
-        second: Vec::new(),
+        first: length.clone(),
+        second: Length::Joints(Vec::new()),
         offsets: [0.0; 2],
         polynomial: [0.0; 5],
         referred: [None; 2],

@@ -5,7 +5,8 @@ use std::path::Path;
 use super::format::ModelFile;
 use super::names::names;
 use super::pairs;
-use super::refusals::{refusals, spatial_tendons};
+use super::refusals::refusals;
+use super::tendons::spatial_tendons;
 use crate::error::ModelError;
 
 /// What a model has, in MuJoCo's words and order.

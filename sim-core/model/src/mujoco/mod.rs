@@ -22,7 +22,6 @@ mod rays;
 mod refusals;
 mod sensors;
 mod tendons;
-mod transmissions;
 mod tree;
 
 use std::path::Path;
@@ -86,12 +85,17 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     if let Some(solver) = solver.first().filter(|solver| *solver != "mjSOL_NEWTON") {
         notes.push(format!("Newton's method takes the place of {solver}"));
     }
-    let spatial = refusals::spatial_tendons(file)?;
-    let spatial = spatial.iter().filter(|&&is_spatial| is_spatial).count();
-    if spatial > 0 {
-        notes.push(format!(
-            "its {spatial} spatial tendons, on which nothing acts, are not read"
-        ));
+    let is_spatial = tendons::spatial_tendons(file)?;
+    let used = tendons::used(file, is_spatial.len())?;
+    if is_spatial
+        .iter()
+        .zip(used)
+        .any(|(&spatial, used)| spatial && used)
+    {
+        notes.push(
+            "cfrc_ext, cfrc_int and sensors of forces between bodies leave out spatial tendons, as in MuJoCo 3.11"
+                .to_owned(),
+        );
     }
     notes.extend(newer_steps(file)?);
     Ok(notes)

@@ -1,5 +1,6 @@
 //! What a model has that the physics does not: each by the name of its element.
 
+use super::actuators::muscles::Muscles;
 use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
@@ -223,12 +224,6 @@ fn equalities(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelEr
 fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("tendon_num");
     let names = names(file, "tendon", count)?;
-    let spatial = spatial_tendons(file)?;
-    for tendon in (0..count).filter(|&tendon| spatial[tendon]) {
-        if acts(file, tendon, count)? {
-            refused.push(no("tendon", &names[tendon], "spatial tendons"));
-        }
-    }
     for which in ["lim", "fri"] {
         let solimps = file.vectors::<5>(&format!("tendon_solimp_{which}"), count)?;
         for (name, solimp) in names.iter().zip(&solimps) {
@@ -238,54 +233,16 @@ fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
     Ok(())
 }
 
-/// Which tendons are made of other things than joints.
-pub(super) fn spatial_tendons(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
-    let count = file.rows("tendon_num");
-    let firsts = file.integers("tendon_adr", count)?;
-    let counts = file.integers("tendon_num", count)?;
-    let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
-    let spatial = firsts.into_iter().zip(counts).map(|(first, count)| {
-        let end = first.saturating_add(count).max(0) as usize;
-        let wraps = kinds.get(first.max(0) as usize..end).unwrap_or_default();
-        wraps.iter().any(|kind| kind != "mjWRAP_JOINT")
-    });
-    Ok(spatial.collect())
-}
-
-/// Does a tendon do anything but show its length?
-fn acts(file: &ModelFile, tendon: usize, count: usize) -> Result<bool, ModelError> {
-    for array in [
-        "tendon_damping",
-        "tendon_stiffness",
-        "tendon_frictionloss",
-        "tendon_armature",
-    ] {
-        if file.has(array) && file.reals(array, count)?[tendon] != 0.0 {
-            return Ok(true);
-        }
-    }
-    if file.integers("tendon_limited", count)?[tendon] != 0 {
-        return Ok(true);
-    }
-    let is_it = |&id: &i64| usize::try_from(id) == Ok(tendon);
-    let actuators = file.rows("actuator_trntype");
-    let kinds = file.kinds("actuator_trntype", actuators)?;
-    let targets = file.vectors_of_integers::<2>("actuator_trnid", actuators)?;
-    let mut moved = kinds.iter().zip(&targets);
-    if moved.any(|(kind, target)| kind == "mjTRN_TENDON" && is_it(&target[0])) {
-        return Ok(true);
-    }
-    let equalities = file.rows("eq_type");
-    let kinds = file.kinds("eq_type", equalities)?;
-    let firsts = file.integers("eq_obj1id", equalities)?;
-    let seconds = file.integers("eq_obj2id", equalities)?;
-    let mut tied = kinds.iter().zip(firsts.iter().zip(&seconds));
-    Ok(
-        tied.any(|(kind, (first, second))| {
-            kind == "mjEQ_TENDON" && (is_it(first) || is_it(second))
-        }),
-    )
-}
+/// Laws of actuators that are supported.
+const DYNAMICS: &[&str] = &[
+    "mjDYN_NONE",
+    "mjDYN_INTEGRATOR",
+    "mjDYN_FILTER",
+    "mjDYN_FILTEREXACT",
+    "mjDYN_MUSCLE",
+];
+const GAINS: &[&str] = &["mjGAIN_FIXED", "mjGAIN_AFFINE", "mjGAIN_MUSCLE"];
+const BIASES: &[&str] = &["mjBIAS_NONE", "mjBIAS_AFFINE", "mjBIAS_MUSCLE"];
 
 fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("actuator_trntype");
@@ -297,29 +254,30 @@ fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
     let states = file.integers("actuator_actnum", count)?;
     let controls = file.integers_or("actuator_ctrlnum", count, 1)?;
     let outputs = file.integers_or("actuator_outnum", count, 1)?;
+    let muscles = Muscles::read(file, count)?;
     for k in 0..count {
         let transmission = match transmissions[k].as_str() {
-            "mjTRN_JOINT" | "mjTRN_JOINTINPARENT" | "mjTRN_TENDON" | "mjTRN_SITE" => None,
+            "mjTRN_JOINT"
+            | "mjTRN_JOINTINPARENT"
+            | "mjTRN_TENDON"
+            | "mjTRN_SITE"
+            | "mjTRN_SLIDERCRANK" => None,
             "mjTRN_BODY" => Some("a body (adhesion)"),
-            "mjTRN_SLIDERCRANK" => Some("a slider-crank"),
             other => Some(other),
         };
         let law = match (dynamics[k].as_str(), gains[k].as_str(), biases[k].as_str()) {
-            ("mjDYN_MUSCLE", ..) | (_, "mjGAIN_MUSCLE", _) => Some("muscles"),
-            (
-                "mjDYN_NONE" | "mjDYN_INTEGRATOR" | "mjDYN_FILTER" | "mjDYN_FILTEREXACT",
-                "mjGAIN_FIXED" | "mjGAIN_AFFINE",
-                bias,
-            ) => (!matches!(bias, "mjBIAS_NONE" | "mjBIAS_AFFINE")).then_some(bias),
-            ("mjDYN_NONE" | "mjDYN_INTEGRATOR" | "mjDYN_FILTER" | "mjDYN_FILTEREXACT", gain, _) => {
-                Some(gain)
-            }
-            (dynamics, ..) => Some(dynamics),
+            (dynamics, ..) if !DYNAMICS.contains(&dynamics) => Some(dynamics),
+            (_, gain, _) if !GAINS.contains(&gain) => Some(gain),
+            (.., bias) => (!BIASES.contains(&bias)).then_some(bias),
         };
         let name = &names[k];
         refused
             .extend(transmission.map(|to| no("actuator", name, &format!("transmission to {to}"))));
         refused.extend(law.map(|law| no("actuator", name, law)));
+        let is_muscle = gains[k] == "mjGAIN_MUSCLE" || biases[k] == "mjBIAS_MUSCLE";
+        if is_muscle && !muscles.is_whole(k) {
+            refused.push(no("actuator", name, "a muscle without a range of lengths"));
+        }
         if controls[k] != 1 || outputs[k] != 1 || states[k] > 1 {
             let several = "several controls, outputs or activations";
             refused.push(no("actuator", name, several));

@@ -1,65 +1,240 @@
-//! Tendons of a model: lengths that are sums of joint positions.
+//! Tendons of a model: sums of joint positions, and lines from site to site around shapes.
 
 use super::format::ModelFile;
+use super::frames::on_links;
 use super::names::names;
-use crate::description::Robot;
+use crate::description::{Length, OnLink, Robot, Span, SpatialTendon, Wrap};
 use crate::error::ModelError;
 
-/// Kinds of tendons, and what they are made of.
+/// Smallest radius and smallest divisor of MuJoCo (`mjMINVAL`) [m, –].
+const TINY: f64 = 1e-15;
+
+/// Tendons, and what their lengths are.
 pub(super) struct Tendons {
     /// Their names.
     pub names: Vec<String>,
-    /// Of each, the robot's joints and their coefficients; none of a spatial tendon.
-    pub terms: Vec<Option<Vec<(usize, f64)>>>,
+    /// Their lengths; none of a spatial tendon that nothing uses.
+    lengths: Vec<Option<Length>>,
+    /// The spatial ones that are used.
+    pub spatial: Vec<SpatialTendon>,
 }
 
 impl Tendons {
     /// Reads the tendons of a model. `robot` has its joints.
     pub fn read(file: &ModelFile, robot: &Robot) -> Result<Tendons, ModelError> {
-        let (count, wraps) = (file.rows("tendon_num"), file.rows("wrap_type"));
-        let firsts = file.integers("tendon_adr", count)?;
-        let counts = file.integers("tendon_num", count)?;
-        let kinds = file.kinds("wrap_type", wraps)?;
-        let joints = file.integers("wrap_objid", wraps)?;
-        let coefficients = file.reals("wrap_prm", wraps)?;
-        let places = moving(robot, file.rows("jnt_type"), file)?;
-        let names = names(file, "tendon", count)?;
-        let terms = (0..count).map(|k| {
-            let first = firsts[k].max(0) as usize;
-            let wraps = first..first.saturating_add(counts[k].max(0) as usize);
-            let fault = || file.fault(format!("has no joints for tendon `{}`", names[k]));
-            let own_kinds = kinds.get(wraps.clone()).ok_or_else(fault)?;
-            if own_kinds.iter().any(|kind| kind != "mjWRAP_JOINT") {
-                return Ok(None);
-            }
-            let mut terms: Vec<(usize, f64)> = Vec::new();
-            for wrap in wraps {
-                let joint = usize::try_from(joints[wrap]).ok();
-                let place = joint.and_then(|joint| places.get(joint)).copied();
-                let place = place.filter(|&place| robot.joints[place].dofs.len() == 1);
-                let place = place.ok_or_else(fault)?;
-                match terms.iter_mut().find(|(known, _)| *known == place) {
-                    Some((_, sum)) => *sum += coefficients[wrap],
-                    None => terms.push((place, coefficients[wrap])),
+        let count = file.rows("tendon_num");
+        let paths = Paths::read(file, robot)?;
+        let mut tendons = Tendons {
+            names: names(file, "tendon", count)?,
+            lengths: Vec::new(),
+            spatial: Vec::new(),
+        };
+        let (is_spatial, is_used) = (spatial_tendons(file)?, used(file, count)?);
+        for k in 0..count {
+            let length = match (is_spatial[k], is_used[k]) {
+                (false, _) => {
+                    let terms = paths.joints(k);
+                    Some(Length::Joints(terms.ok_or_else(|| tendons.fault(file, k))?))
                 }
-            }
-            Ok(Some(terms))
-        });
-        Ok(Tendons {
-            terms: terms.collect::<Result<_, _>>()?,
-            names,
+                (true, false) => None,
+                (true, true) => {
+                    let spans = paths.spans(k);
+                    let spans = spans.ok_or_else(|| tendons.fault(file, k))?;
+                    tendons.spatial.push(SpatialTendon { spans });
+                    Some(Length::Spatial(tendons.spatial.len() - 1))
+                }
+            };
+            tendons.lengths.push(length);
+        }
+        Ok(tendons)
+    }
+
+    fn fault(&self, file: &ModelFile, tendon: usize) -> ModelError {
+        let name = &self.names[tendon];
+        file.fault(format!("has no whole path for tendon `{name}`"))
+    }
+
+    /// The length of a tendon.
+    ///
+    /// # Errors
+    /// No such tendon.
+    pub fn length(&self, file: &ModelFile, tendon: i64) -> Result<&Length, ModelError> {
+        let place = usize::try_from(tendon).ok();
+        let length = place.and_then(|place| self.lengths.get(place)?.as_ref());
+        length.ok_or_else(|| file.fault(format!("has no tendon {tendon}")))
+    }
+}
+
+/// Arrays of the paths of tendons.
+struct Paths<'a> {
+    robot: &'a Robot,
+    firsts: Vec<i64>,
+    counts: Vec<i64>,
+    kinds: Vec<String>,
+    objects: Vec<i64>,
+    numbers: Vec<f64>,
+    /// Places of MuJoCo's joints among the robot's.
+    joints: Vec<usize>,
+    sites: Vec<OnLink>,
+    geoms: Vec<OnLink>,
+    sizes: Vec<[f64; 3]>,
+}
+
+impl<'a> Paths<'a> {
+    fn read(file: &ModelFile, robot: &'a Robot) -> Result<Paths<'a>, ModelError> {
+        let (count, wraps) = (file.rows("tendon_num"), file.rows("wrap_type"));
+        let links = robot.links.len();
+        Ok(Paths {
+            robot,
+            firsts: file.integers("tendon_adr", count)?,
+            counts: file.integers("tendon_num", count)?,
+            kinds: file.kinds("wrap_type", wraps)?,
+            objects: file.integers("wrap_objid", wraps)?,
+            numbers: file.reals("wrap_prm", wraps)?,
+            joints: moving(robot, file.rows("jnt_type"), file)?,
+            sites: on_links(file, "site", links)?,
+            geoms: on_links(file, "geom", links)?,
+            sizes: file.vectors::<3>("geom_size", file.rows("geom_bodyid"))?,
         })
     }
 
-    /// The terms of a tendon.
-    ///
-    /// # Errors
-    /// No such tendon, or a spatial one.
-    pub fn terms(&self, file: &ModelFile, tendon: i64) -> Result<&[(usize, f64)], ModelError> {
-        let place = usize::try_from(tendon).ok();
-        let terms = place.and_then(|place| self.terms.get(place)?.as_deref());
-        terms.ok_or_else(|| file.fault(format!("has no fixed tendon {tendon}")))
+    /// Rows of a tendon's path; none if the file has fewer.
+    fn rows(&self, tendon: usize) -> Option<std::ops::Range<usize>> {
+        let first = usize::try_from(self.firsts[tendon]).ok()?;
+        let end = first.checked_add(usize::try_from(self.counts[tendon]).ok()?)?;
+        (end <= self.kinds.len()).then_some(first..end)
     }
+
+    fn object<T: Copy>(&self, all: &[T], row: usize) -> Option<T> {
+        all.get(usize::try_from(self.objects[row]).ok()?).copied()
+    }
+
+    /// Joints of a fixed tendon and their coefficients.
+    fn joints(&self, tendon: usize) -> Option<Vec<(usize, f64)>> {
+        let mut terms: Vec<(usize, f64)> = Vec::new();
+        for row in self.rows(tendon)? {
+            let place = self.object(&self.joints, row)?;
+            if self.robot.joints[place].dofs.len() != 1 {
+                return None;
+            }
+            match terms.iter_mut().find(|(known, _)| *known == place) {
+                Some((_, sum)) => *sum += self.numbers[row],
+                None => terms.push((place, self.numbers[row])),
+            }
+        }
+        Some(terms)
+    }
+
+    /// Pieces of a spatial tendon; none where MuJoCo would refuse the path.
+    fn spans(&self, tendon: usize) -> Option<Vec<Span>> {
+        let mut spans = Vec::new();
+        let (mut from, mut share, mut wrap) = (None, 1.0, None);
+        let mut is_open = false;
+        for row in self.rows(tendon)? {
+            match self.kinds[row].as_str() {
+                // a new branch, of which a part counts
+                "mjWRAP_PULLEY" if wrap.is_none() => {
+                    let divisor = self.numbers[row];
+                    share = (divisor >= TINY && divisor.is_finite()).then(|| 1.0 / divisor)?;
+                    (from, is_open) = (None, true);
+                }
+                "mjWRAP_SITE" => {
+                    let to = self.object(&self.sites, row)?;
+                    let wrap = wrap.take().flatten();
+                    spans.extend(from.map(|from| Span {
+                        from,
+                        to,
+                        share,
+                        wrap,
+                    }));
+                    (from, is_open) = (Some(to), false);
+                }
+                kind @ ("mjWRAP_SPHERE" | "mjWRAP_CYLINDER")
+                    if from.is_some() && wrap.is_none() =>
+                {
+                    wrap = Some(self.wrap(row, kind == "mjWRAP_CYLINDER")?);
+                }
+                _ => return None,
+            }
+        }
+        (wrap.is_none() && !is_open).then_some(spans)
+    }
+
+    /// A shape of a path; none of one that is too small.
+    fn wrap(&self, row: usize, is_cylinder: bool) -> Option<Option<Wrap>> {
+        let side = self.numbers[row];
+        let side = match side > -0.5 {
+            true => Some(*self.sites.get(side.round() as usize)?),
+            false => None,
+        };
+        let [radius, ..] = self.object(&self.sizes, row)?;
+        let at = self.object(&self.geoms, row)?;
+        if !radius.is_finite() {
+            return None;
+        }
+        Some((radius >= TINY).then_some(Wrap {
+            at,
+            is_cylinder,
+            radius,
+            side,
+        }))
+    }
+}
+
+/// Which tendons are made of other things than joints.
+pub(super) fn spatial_tendons(file: &ModelFile) -> Result<Vec<bool>, ModelError> {
+    let count = file.rows("tendon_num");
+    let firsts = file.integers("tendon_adr", count)?;
+    let counts = file.integers("tendon_num", count)?;
+    let kinds = file.kinds("wrap_type", file.rows("wrap_type"))?;
+    let spatial = firsts.into_iter().zip(counts).map(|(first, count)| {
+        let end = first.saturating_add(count).max(0) as usize;
+        let wraps = kinds.get(first.max(0) as usize..end).unwrap_or_default();
+        wraps.iter().any(|kind| kind != "mjWRAP_JOINT")
+    });
+    Ok(spatial.collect())
+}
+
+/// Which tendons are measured, or act.
+pub(super) fn used(file: &ModelFile, count: usize) -> Result<Vec<bool>, ModelError> {
+    let mut used = vec![false; count];
+    for array in ["tendon_damping", "tendon_stiffness", "tendon_frictionloss"] {
+        let values = file.reals(array, count)?;
+        (used.iter_mut().zip(values)).for_each(|(used, value)| *used |= value != 0.0);
+    }
+    let limited = file.integers("tendon_limited", count)?;
+    (used.iter_mut().zip(limited)).for_each(|(used, limited)| *used |= limited != 0);
+    // what names a tendon: arrays of kinds, of indices, and the kind that counts
+    let mut named = |kinds: Vec<String>, ids: Vec<i64>, kind: &str| {
+        for (own_kind, id) in kinds.iter().zip(ids) {
+            let tendon = usize::try_from(id).ok().and_then(|id| used.get_mut(id));
+            if let (true, Some(used)) = (own_kind == kind, tendon) {
+                *used = true;
+            }
+        }
+    };
+    let actuators = file.rows("actuator_trntype");
+    let targets = file.vectors_of_integers::<2>("actuator_trnid", actuators)?;
+    let targets = targets.into_iter().map(|[target, _]| target).collect();
+    let kinds = file.kinds("actuator_trntype", actuators)?;
+    named(kinds, targets, "mjTRN_TENDON");
+    let equalities = file.rows("eq_type");
+    for array in ["eq_obj1id", "eq_obj2id"] {
+        let kinds = file.kinds("eq_type", equalities)?;
+        named(kinds, file.integers(array, equalities)?, "mjEQ_TENDON");
+    }
+    // files of older releases have none
+    if !file.has("sensor_type") {
+        return Ok(used);
+    }
+    let sensors = file.rows("sensor_type");
+    let kinds = file.kinds("sensor_objtype", sensors)?;
+    named(
+        kinds,
+        file.integers("sensor_objid", sensors)?,
+        "mjOBJ_TENDON",
+    );
+    Ok(used)
 }
 
 /// Places of a tendon's actuators, and the range of the sum of their forces [N or N·m].

@@ -109,6 +109,7 @@ fn parts(
         constraints: Vec::new(),
         drags: passive::drags(file, bodies)?,
         compensations: passive::compensations(file, bodies)?,
+        spatial_tendons: Vec::new(),
         tendons: Vec::new(),
         actuators: Vec::new(),
         tendon_bounds: tendons::bounds(file)?,

@@ -138,6 +138,12 @@ arrays! { m;
             => "bias_force" [Dofs], "Coriolis, centrifugal and gravity forces: what holds the joints at zero acceleration.";
         smooth_force: SmoothForce [Scalar; m.dofs.len()] Stage "N·m or N"
             => "smooth_force" [Dofs], "Applied, drive and damping forces less the bias: all but constraint forces.";
+        // spatial tendons: lengths, their rates, and moments, see `SpatialTendon::first`
+        ten_length: TenLength [Scalar; m.tendons.len()] Stage "m";
+        ten_velocity: TenVelocity [Scalar; m.tendons.len()] Stage "m/s";
+        ten_moment: TenMoment [Scalar; m.tendons.iter().map(|tendon| tendon.dofs.len()).sum::<usize>()] Stage "m/rad or –";
+        // J (ω × (ω × o)) of free bodies, which MuJoCo's acceleration of a length has beside our J q̈
+        ten_swing: TenSwing [Scalar; m.tendons.len()] Stage "m/s²";
         actuator_length: ActuatorLength [Scalar; m.actuators.all.len()] Stage "rad or m"
             => "actuator_length" [Actuators], "Length of each actuator, gear included.";
         actuator_velocity: ActuatorVelocity [Scalar; m.actuators.all.len()] Stage "rad/s or m/s"

@@ -1,8 +1,8 @@
 //! Actuators: forces along lengths that a control and an activation drive.
 
+use super::lengths::Term;
 use super::recast::{Recast, recast};
 use super::site::Mount;
-use super::springs::Term;
 use crate::lane::Real;
 
 recast! {
@@ -52,6 +52,48 @@ recast! {
         pub gain: [R; 3],
         /// What is added to it: a constant, and factors of length and velocity.
         pub bias: [R; 3],
+        /// In place of that gain, a muscle's.
+        pub muscle_gain: Option<Muscle<R>>,
+        /// In place of that bias, a muscle's.
+        pub muscle_bias: Option<Muscle<R>>,
+    }
+}
+
+recast! {
+    /// A muscle (MuJoCo: `actuator/muscle`). Lengths are those of the actuator, `l_` and `f_` without units.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Muscle<R> {
+        /// Peak active force [N].
+        pub peak: R,
+        /// Shortest length of the actuator [m].
+        pub shortest: R,
+        /// The same in units of the optimal length.
+        pub l_shortest: R,
+        /// 1 over the optimal length [1/m].
+        pub inverse_optimum: R,
+        /// 1 over the velocity at which it shortens without force [s/m].
+        pub inverse_speed: R,
+        /// Shortest length with an active force.
+        pub l_min: R,
+        /// Longest length with an active force.
+        pub l_max: R,
+        /// Passive force at `l_max`, in units of the peak.
+        pub fp_max: R,
+        /// Active force where it lengthens, in units of the peak.
+        pub fv_max: R,
+    }
+}
+
+recast! {
+    /// How fast a muscle's activation follows its control.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MuscleRate<R> {
+        /// Time constant of activation [s].
+        pub rise: R,
+        /// Time constant of deactivation [s].
+        pub fall: R,
+        /// Difference of control and activation over which the one changes into the other; 0 for a switch.
+        pub width: R,
     }
 }
 
@@ -103,6 +145,8 @@ pub enum ActivationRate<R> {
     Control,
     /// As the control less the activation, over this time constant [s].
     Filter(R),
+    /// As that of a muscle.
+    Muscle(MuscleRate<R>),
 }
 
 recast! {
@@ -139,6 +183,10 @@ pub enum LengthKind<R> {
     },
     /// Nothing: forces and torques in the axes of a site. With a second site, where the first is to it.
     Site(Sites<R>),
+    /// The length of a spatial tendon, of this index.
+    Tendon(usize),
+    /// Where the slider of a slider-crank is.
+    SliderCrank(SliderCrank<R>),
 }
 
 recast! {
@@ -152,6 +200,19 @@ recast! {
     }
 }
 
+recast! {
+    /// A rod from a slider to a crank.
+    #[derive(Clone, Debug)]
+    pub struct SliderCrank<R> {
+        /// The site along whose z axis the slider moves.
+        pub slider: Mount<R>,
+        /// The site on the crank.
+        pub crank: Mount<R>,
+        /// How long the rod is [m].
+        pub rod: R,
+    }
+}
+
 impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for ActivationRate<R> {
     type Out = ActivationRate<S>;
     fn recast(&self) -> ActivationRate<S> {
@@ -159,6 +220,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for ActivationRate<R> {
             ActivationRate::Held => ActivationRate::Held,
             ActivationRate::Control => ActivationRate::Control,
             ActivationRate::Filter(time) => ActivationRate::Filter(time.recast()),
+            ActivationRate::Muscle(rate) => ActivationRate::Muscle(rate.recast()),
         }
     }
 }
@@ -170,6 +232,8 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for LengthKind<R> {
             LengthKind::Ball { coord, in_parent } => LengthKind::Ball { coord, in_parent },
             LengthKind::Free { body, in_parent } => LengthKind::Free { body, in_parent },
             LengthKind::Site(ref sites) => LengthKind::Site(sites.recast()),
+            LengthKind::Tendon(tendon) => LengthKind::Tendon(tendon),
+            LengthKind::SliderCrank(ref crank) => LengthKind::SliderCrank(crank.recast()),
         }
     }
 }

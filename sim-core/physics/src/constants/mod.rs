@@ -5,6 +5,7 @@ pub mod clip;
 pub mod contact;
 pub mod height_field;
 pub mod hull;
+pub mod lengths;
 pub mod options;
 pub mod outputs;
 pub mod pair_groups;
@@ -16,6 +17,7 @@ pub mod sensors;
 pub mod site;
 mod sizes;
 pub mod springs;
+pub mod tendons;
 pub mod ties;
 
 pub use self::recast::Recast;
@@ -32,6 +34,7 @@ use self::scan::HeightScan;
 use self::sensors::Sensors;
 use self::site::Site;
 use self::springs::Springs;
+use self::tendons::SpatialTendon;
 use self::ties::Tie;
 use crate::lane::Real;
 use crate::math::factor::Pattern;
@@ -86,6 +89,8 @@ recast! {
         pub scans: Vec<HeightScan<R>>,
         /// How a step integrates velocities.
         pub integrator: Integrator,
+        /// Spatial tendons.
+        pub tendons: Vec<SpatialTendon<R>>,
         /// Springs and dampers.
         pub springs: Springs<R>,
         /// Bodies of free joints whose armature and damping belong to the velocity of their frame.

@@ -97,8 +97,8 @@ params! {
     BodyF "body_f" Per::Body(6), "N, N·m" None, "Force on each link at its centre of mass, then torque, in world axes, until it is written again; a reset clears it.";
     BodyMass "body_mass" Per::Body(1), "kg" Some(0.0), "Mass of each link, before its scale. Its inertia stays.";
     BodyInertia "body_inertia" Per::Body(6), "kg·m²" None, "Inertia of each link about its centre of mass in the link's axes, before its scale: xx, yy, zz, xy, xz, yz.";
-    ActuatorGain "actuator_gain" Per::Actuator(3), "–" None, "Gain of each actuator of MuJoCo models: constant, per length, per velocity.";
-    ActuatorBias "actuator_bias" Per::Actuator(3), "–" None, "Bias of each actuator of MuJoCo models: constant, per length, per velocity.";
+    ActuatorGain "actuator_gain" Per::Actuator(3), "–" None, "Gain of each actuator of MuJoCo models: constant, per length, per velocity; muscles keep their own.";
+    ActuatorBias "actuator_bias" Per::Actuator(3), "–" None, "Bias of each actuator of MuJoCo models: constant, per length, per velocity; muscles keep their own.";
     BodyCom "body_com" Per::Body(3), "m" None, "Centre of mass of each link in its own axes. The point that the velocity of a free joint is of stays where the scene has it.";
     BodyInvweight0 "body_invweight0" Per::Body(1), "1/kg" Some(0.0), "Inverse weight of each link at the reference pose, MuJoCo's first `body_invweight0`: the softness of its contacts.";
     DofInvweight0 "dof_invweight0" Per::Dof, "1/(kg·m²) or 1/kg" Some(0.0), "Inverse inertia of each dof at the reference pose, as MuJoCo's: the softness of the limits of hinges and slides.";

@@ -1,8 +1,8 @@
 //! Sensors of MuJoCo models.
 
+use super::lengths::Length;
 use super::recast::{Recast, recast, same};
 use super::site::Mount;
-use super::springs::Term;
 use crate::lane::{Fixed, Real};
 
 recast! {
@@ -80,10 +80,10 @@ recast! {
 pub enum SensorKind<R> {
     /// A vector of the world in the axes of a frame (MuJoCo: `magnetometer`).
     Vector(Mount<R>, [R; 3]),
-    /// A sum of coordinates times coefficients [rad or m].
-    Length(Vec<Term<R>>),
+    /// A length [rad or m].
+    Length(Length<R>),
     /// Its rate of change [rad/s or m/s].
-    Rate(Vec<Term<R>>),
+    Rate(Length<R>),
     /// Length of an actuator [rad or m].
     ActuatorLength(usize),
     /// Its rate of change [rad/s or m/s].
@@ -281,8 +281,8 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
         use SensorKind::*;
         match self {
             Vector(mount, vector) => Vector(mount.recast(), vector.recast()),
-            Length(terms) => Length(terms.recast()),
-            Rate(terms) => Rate(terms.recast()),
+            Length(length) => Length(length.recast()),
+            Rate(length) => Rate(length.recast()),
             ActuatorLength(actuator) => ActuatorLength(*actuator),
             ActuatorRate(actuator) => ActuatorRate(*actuator),
             BallQuat(coord) => BallQuat(*coord),

@@ -1,5 +1,6 @@
 //! Springs and dampers of joints and tendons.
 
+use super::lengths::Length;
 use super::recast::{Recast, recast};
 
 recast! {
@@ -54,27 +55,16 @@ recast! {
 }
 
 recast! {
-    /// A fixed tendon that acts as a spring and a damper: its length is the sum of coordinates times coefficients.
+    /// A tendon that acts as a spring and a damper.
     #[derive(Clone, Debug)]
     pub struct Tendon<R> {
-        /// The terms of its length.
-        pub terms: Vec<Term<R>>,
+        /// Its length.
+        pub length: Length<R>,
         /// [N/m or N·m/rad]
         pub stiffness: R,
         /// Lengths between which its spring has no force [m or rad].
         pub rest: [R; 2],
         /// [N·s/m or N·m·s/rad]
         pub damping: R,
-    }
-}
-
-recast! {
-    /// A dof with one coordinate, and a factor.
-    #[derive(Clone, Debug)]
-    pub struct Term<R> {
-        /// The dof.
-        pub dof: usize,
-        /// [–]
-        pub coefficient: R,
     }
 }

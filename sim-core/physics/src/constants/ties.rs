@@ -1,9 +1,9 @@
 //! Constraints from MuJoCo whose Jacobians are found at run time: bodies that are connected, tendons, and limits of balls.
 
 use super::Soft;
+use super::lengths::Length;
 use super::recast::{Recast, recast};
 use super::site::Mount;
-use super::springs::Term;
 use crate::lane::Real;
 
 recast! {
@@ -43,13 +43,13 @@ pub enum Measure<R> {
 }
 
 recast! {
-    /// l₁ - o₁ - p(l₂ - o₂), where l are sums of coordinates times coefficients.
+    /// l₁ - o₁ - p(l₂ - o₂)
     #[derive(Clone, Debug)]
     pub struct Lengths<R> {
-        /// Terms of l₁.
-        pub first: Vec<Term<R>>,
-        /// Terms of l₂.
-        pub second: Vec<Term<R>>,
+        /// l₁
+        pub first: Length<R>,
+        /// l₂
+        pub second: Length<R>,
         /// o₁ and o₂ [rad or m].
         pub offsets: [R; 2],
         /// Coefficients of p, the constant first.

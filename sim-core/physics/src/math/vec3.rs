@@ -69,6 +69,16 @@ impl<F: Num> Vec3<F> {
     }
 }
 
+/// `a` where the mask holds, else `b`.
+#[inline(always)]
+pub fn select<F: Num>(mask: F::Mask, a: Vec3<F>, b: Vec3<F>) -> Vec3<F> {
+    Vec3([
+        F::select(mask, a[0], b[0]),
+        F::select(mask, a[1], b[1]),
+        F::select(mask, a[2], b[2]),
+    ])
+}
+
 /// Three neighbouring scalars of a row, from scalar `k` on; see [`Cx::load3`].
 #[inline(always)]
 pub fn load_vec3<C: Cx>(cx: &mut C, t: Table, row: C::I, k: usize) -> Vec3<C::F> {

@@ -7,10 +7,12 @@ pub mod collide;
 pub mod constraints;
 pub mod forces;
 pub mod integrate;
+mod lengths;
 pub mod outputs;
 mod params;
 pub mod solver;
 mod stage;
+pub mod tendons;
 pub mod tree;
 
 use params::{gravity, masses, param};
@@ -27,6 +29,7 @@ macro_rules! every_stage {
             kinematics           [tree::kinematics::Kinematics]              Both;
             bias                 [tree::bias::Bias]                          Both;
             mass_matrix          [tree::mass_matrix::MassMatrix]             Both;
+            tendons              [tendons::Tendons]                          Both;
             // forces but those of constraints, summed in `smooth_force`
             actuation            [forces::actuation::Actuation]              Both;
             springs              [forces::springs::Springs]                  Both;

@@ -169,10 +169,10 @@ def test_commands_are_checked(model):
             ["geom0", "ellipsoid"],
         ),
         (
-            '<worldbody><body><joint name="j" range="-9 9"/>'
+            '<worldbody><body name="b"><joint name="j" range="-9 9"/>'
             '<geom name="g" size=".1" fluidshape="ellipsoid"/></body></worldbody>'
-            '<actuator><muscle name="m" joint="j"/></actuator>',
-            ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for muscles"],
+            '<actuator><adhesion name="m" body="b" ctrlrange="0 1"/></actuator>',
+            ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for transmission to"],
         ),
         (
             '<worldbody><geom name="f" type="plane" size="1 1 1"/>'

@@ -151,6 +151,10 @@ class Expansions:
                 found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
             elif name in gains.PARAMS:
                 self._check_finite(name, ids)
+                changed = gains.changed_muscles(self._model, name, array[ids])
+                if changed.any():
+                    sim = ids[int(changed.argmax())]
+                    raise ArgumentError(f"sim {sim}: {name} of a muscle cannot differ from the model's")
                 found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
             elif name in varied_fields.FIELDS:
                 self._check_finite(name, ids)

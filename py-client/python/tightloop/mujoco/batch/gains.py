@@ -18,6 +18,8 @@ _LAWS = {
     "actuator_biasprm": ("actuator_biastype", None, mujoco.mjtBias.mjBIAS_AFFINE),
 }
 
+_MUSCLES = {"actuator_gainprm": mujoco.mjtGain.mjGAIN_MUSCLE, "actuator_biasprm": mujoco.mjtBias.mjBIAS_MUSCLE}
+
 
 def factors(model: Any, name: str, values: Array) -> Array:
     """Return constant and factors of length and velocity, ``(n, nu, 3)``; 0 where MuJoCo does not read a number.
@@ -36,3 +38,16 @@ def factors(model: Any, name: str, values: Array) -> Array:
     groups = np.asarray(model.actuator_group)
     reads[(groups >= 0) & (groups <= 30) & (model.opt.disableactuator >> np.clip(groups, 0, 30) & 1 == 1)] = False
     return np.where(reads, values[..., :3].astype(np.float64), 0.0)
+
+
+def changed_muscles(model: Any, name: str, values: Array) -> Array:
+    """Return in which simulations a muscle has other numbers than in the model, ``(n,)``.
+
+    Args:
+        model: The model.
+        name: ``actuator_gainprm`` or ``actuator_biasprm``.
+        values: Its values, ``(n, nu, 10)``.
+    """
+    muscles = np.asarray(getattr(model, _LAWS[name][0])) == _MUSCLES[name]
+    fixed = np.asarray(getattr(model, name))[muscles].astype(values.dtype)
+    return (values[:, muscles] != fixed).any(axis=(1, 2))

@@ -1,7 +1,7 @@
 //! What sensors measure, by their types.
 
 use super::{Reader, Sensed};
-use crate::description::{FramePart, LimitPart, OnLink, Sense, SubtreePart};
+use crate::description::{FramePart, Length, LimitPart, OnLink, Sense, SubtreePart};
 use crate::error::ModelError;
 use crate::mujoco::options::has_flag;
 use crate::pose::Pose;
@@ -19,15 +19,12 @@ impl Reader<'_> {
                 Sense::Vector(self.site(k)?, vector)
             }
             "JOINTPOS" | "JOINTVEL" => Sense::Length {
-                terms: vec![(self.scalar_joint(k)?, 1.0)],
+                of: Length::Joints(vec![(self.scalar_joint(k)?, 1.0)]),
                 is_rate: kind == "JOINTVEL",
             },
-            "TENDONPOS" | "TENDONVEL" => match self.tendon(k)? {
-                Some(terms) => Sense::Length {
-                    terms: terms.to_vec(),
-                    is_rate: kind == "TENDONVEL",
-                },
-                None => return Ok(Err("spatial tendons".to_owned())),
+            "TENDONPOS" | "TENDONVEL" => Sense::Length {
+                of: self.tendon(k)?.clone(),
+                is_rate: kind == "TENDONVEL",
             },
             "ACTUATORPOS" | "ACTUATORVEL" => Sense::Actuator {
                 actuator: self.actuator(k)?,

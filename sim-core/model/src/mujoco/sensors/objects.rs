@@ -1,7 +1,7 @@
 //! What sensors are about: frames, joints, tendons, actuators and limits.
 
 use super::Reader;
-use crate::description::{ConstraintLaw, LimitPart, Measure, OnLink, Sense};
+use crate::description::{ConstraintLaw, Length, LimitPart, Measure, OnLink, Sense};
 use crate::error::ModelError;
 use crate::pose::Pose;
 
@@ -78,10 +78,9 @@ impl Reader<'_> {
         self.index(k, self.file.rows("actuator_trntype"))
     }
 
-    /// The terms of a tendon; none of a spatial one.
-    pub(super) fn tendon(&self, k: usize) -> Result<Option<&[(usize, f64)]>, ModelError> {
-        let tendon = self.index(k, self.tendons.terms.len())?;
-        Ok(self.tendons.terms[tendon].as_deref())
+    /// The length of a tendon.
+    pub(super) fn tendon(&self, k: usize) -> Result<&Length, ModelError> {
+        self.tendons.length(self.file, self.ids[0][k])
     }
 
     pub(super) fn actuators_of_tendon(&self, k: usize) -> Result<Vec<usize>, ModelError> {
@@ -109,10 +108,10 @@ impl Reader<'_> {
     }
 
     pub(super) fn tendon_limit(&self, k: usize, part: LimitPart) -> Result<Sense, ModelError> {
-        let terms = self.tendon(k)?;
+        let length = self.tendon(k)?;
         // several tendons may have the same terms: limits are in the order of tendons
         let is_own = |measure: &Measure| match measure {
-            Measure::Lengths { first, .. } => terms == Some(&first[..]),
+            Measure::Lengths { first, .. } => first == length,
             _ => false,
         };
         Ok(Sense::ConstraintLimit(self.limit(is_own), part))

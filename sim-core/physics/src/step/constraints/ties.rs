@@ -13,12 +13,12 @@ use super::tied_frames::of_frames;
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::params::Param;
-use crate::constants::springs::Term;
 use crate::constants::ties::{Lengths, Measure, Tie, TieLaw};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
 use crate::math::spatial::ANGULAR;
 use crate::math::vec3::Vec3;
+use crate::step::lengths::{length, moments, swing};
 use crate::step::params::moved_by;
 use crate::step::tree::bias::accelerations_at_rest;
 use crate::step::tree::kinematics::read_quat;
@@ -47,6 +47,9 @@ impl Stage for Ties {
         A::Arm,
         A::Motion,
         A::Velocity,
+        A::TenLength,
+        A::TenMoment,
+        A::TenSwing,
         A::EfcD,
         A::EfcAref,
     ];
@@ -106,12 +109,12 @@ fn measure<C: Cx>(
     b.work.row_jacobian[jacobian].fill(C::F::c(0.0));
     match &tie.measure {
         Measure::Lengths(lengths) => {
-            let length = of_lengths(cx, m, b, tie, lengths);
-            match tie.law {
-                // dry friction acts at every length
-                TieLaw::Friction(_) => Measured::at(&[]),
-                TieLaw::Equality(_) | TieLaw::Range(_) => Measured::at(&[length]),
+            let mut measured = of_lengths(cx, m, b, tie, lengths);
+            // dry friction acts at every length
+            if let TieLaw::Friction(_) = tie.law {
+                measured.position[0] = C::F::c(0.0);
             }
+            measured
         }
         Measure::Angle(coord, _) => {
             // |θ| and its axis, to which `write_rows` gives the sign of the bound
@@ -131,22 +134,6 @@ fn measure<C: Cx>(
         Measure::Free(body) => of_free(m, &mut b.work, tie, *body),
         Measure::Frames(frames) => of_frames::<C>(m, b, tie, frames),
     }
-}
-
-/// Σ c q
-#[inline(always)]
-pub(in crate::step) fn length<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &BlockOf<C>,
-    terms: &[Term<<C::F as Num>::Real>],
-) -> C::F {
-    let mut length = C::F::c(0.0);
-    for term in terms {
-        let q = cx.get(&b.joint_q[m.dofs[term.dof].coord]);
-        length = q.fma(C::F::k(term.coefficient), length);
-    }
-    length
 }
 
 /// o₁ and o₂, of each world where the references of joints vary.
@@ -170,7 +157,7 @@ fn of_lengths<C: Cx>(
     b: &mut BlockOf<C>,
     tie: &Tie<<C::F as Num>::Real>,
     lengths: &Lengths<<C::F as Num>::Real>,
-) -> C::F {
+) -> Measured<C::F> {
     let [first, second] = offsets(m, &b.params, lengths);
     // l₁ - o₁ and l₂ - o₂
     let first_change = length(cx, m, b, &lengths.first) - first;
@@ -182,19 +169,23 @@ fn of_lengths<C: Cx>(
         value = value.fma(second_change, C::F::k(*coefficient));
     }
     // a dof may be in both lengths, so entries are added up
+    let w = &mut b.work;
+    let (jacobian, ten_moment) = (&mut w.row_jacobian, &w.ten_moment);
     let mut add = |dof: usize, x: C::F| {
         let column = tie.dofs.iter().position(|&tied| tied == dof);
-        let place = tie.first + column.unwrap_or_default();
-        b.work.row_jacobian[place] = b.work.row_jacobian[place] + x;
+        let entry = &mut jacobian[tie.first + column.unwrap_or_default()];
+        *entry = *entry + x;
     };
-    // J = ∂l₁ - p' ∂l₂
-    for term in &lengths.first {
-        add(term.dof, C::F::k(term.coefficient));
-    }
-    for term in &lengths.second {
-        add(term.dof, -(slope * C::F::k(term.coefficient)));
-    }
-    first_change - value
+    // J = ∂l₁ - p' ∂l₂, and its J̇ q̇
+    moments::<C>(m, ten_moment, &lengths.first, |dof, moment| {
+        add(dof, moment)
+    });
+    moments::<C>(m, ten_moment, &lengths.second, |dof, moment| {
+        add(dof, -(slope * moment))
+    });
+    let mut measured = Measured::at(&[first_change - value]);
+    measured.swing[0] = slope.fnma(swing(w, &lengths.second), swing(w, &lengths.first));
+    measured
 }
 
 /// MuJoCo's velocities of a free body from ours, and the acceleration of its frame's origin that our J q̈ lacks.
@@ -237,7 +228,7 @@ fn write_rows<C: Cx>(
     measured: &Measured<C::F>,
 ) {
     let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
-    let mut position = measured.position;
+    let (mut position, mut swing) = (measured.position, measured.swing);
     // in which worlds it acts: an equality that is on, dry friction always, a range past a bound
     let active = match tie.law {
         TieLaw::Equality(place) => Some(C::F::c(0.5).lt(b.eq_active[place])),
@@ -250,6 +241,7 @@ fn write_rows<C: Cx>(
                 *entry = *entry * side;
             }
             position[0] = above.min(below);
+            swing[0] = swing[0] * side;
             Some(position[0].lt(zero))
         }
     };
@@ -280,7 +272,7 @@ fn write_rows<C: Cx>(
         }
         // aref = -b v - k d r - J̇ q̇
         let spring = C::F::k(tie.soft.stiffness) * d * position[k];
-        let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - measured.swing[k];
+        let mut aref = -velocity.fma(C::F::k(tie.soft.damping), spring) - swing[k];
         // a select: the tie may act in other worlds of the block
         if let Some(active) = active {
             weight = C::F::select(active, weight, zero);

@@ -10,15 +10,14 @@
 //! Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps the sum in its range, before it is
 //! clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
 
+use super::muscles;
 use super::transmission::measure;
 use crate::arrays::Array as A;
-use crate::constants::actuators::{Activation, ActivationRate, TurningLength};
+use crate::constants::Constants;
+use crate::constants::actuators::{Activation, ActivationRate};
 use crate::constants::actuators::{Actuator, TendonBound};
 use crate::constants::params::Param;
-use crate::constants::springs::Term;
-use crate::constants::{Constants, Motion};
-use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::vec3::Vec3;
+use crate::lane::{Cx, Num, Real};
 use crate::step::{BlockOf, ConstantsOf, Stage, param};
 
 /// Forces of the actuators.
@@ -35,6 +34,8 @@ impl Stage for Actuators {
         A::Origin,
         A::Reference,
         A::Motion,
+        A::TenLength,
+        A::TenMoment,
         A::SmoothForce,
         A::QfrcGravcomp,
     ];
@@ -158,6 +159,10 @@ fn rate<C: Cx>(
             let off = control(b, actuator, k) - cx.get(&b.act[activation.place]);
             off.div(C::F::k(time))
         }
+        ActivationRate::Muscle(ref rate) => {
+            let act = cx.get(&b.act[activation.place]);
+            muscles::rate(rate, control(b, actuator, k), act)
+        }
     }
 }
 
@@ -169,7 +174,7 @@ pub(in crate::step) fn next<F: Num>(activation: &Activation<F::Real>, act: F, ra
 
 /// What the force of actuator `k` follows: its control or its activation.
 #[inline(always)]
-fn input<C: Cx>(
+pub(super) fn input<C: Cx>(
     cx: &mut C,
     b: &BlockOf<C>,
     actuator: &Actuator<<C::F as Num>::Real>,
@@ -209,21 +214,17 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
     }
     b.work.actuator_length[k] = length;
     b.work.actuator_velocity[k] = velocity;
+    let state = [length, velocity];
     // g = g₀ + g₁ l + g₂ v, and b alike
-    let gain = law(
-        m,
-        &b.params,
-        Param::ActuatorGain,
-        (k, actuator.gain),
-        [length, velocity],
-    );
-    let bias = law(
-        m,
-        &b.params,
-        Param::ActuatorBias,
-        (k, actuator.bias),
-        [length, velocity],
-    );
+    let (params, gain, bias) = (&b.params, actuator.gain, actuator.bias);
+    let gain = match &actuator.muscle_gain {
+        Some(muscle) => muscles::gain(muscle, state),
+        None => law(m, params, Param::ActuatorGain, (k, gain), state),
+    };
+    let bias = match &actuator.muscle_bias {
+        Some(muscle) => muscles::bias(muscle, length),
+        None => law(m, params, Param::ActuatorBias, (k, bias), state),
+    };
     gain.fma(input, bias)
 }
 
@@ -251,7 +252,11 @@ fn law<F: Num>(
 
 /// Bounds of the force of actuator `k`, if it has any.
 #[inline(always)]
-fn force_range<F: Num>(m: &Constants<F::Real>, params: &[F], k: usize) -> Option<[F; 2]> {
+pub(super) fn force_range<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    k: usize,
+) -> Option<[F; 2]> {
     let [least, most] = m.actuators.all[k].force_range?;
     let which = Param::ActuatorForcerange;
     Some([
@@ -266,130 +271,4 @@ fn bounded<F: Num>(x: F, range: Option<[F::Real; 2]>) -> F {
         Some([least, most]) => x.max(F::k(least)).min(F::k(most)),
         None => x,
     }
-}
-
-/// Adds -h ∂force/∂v of actuators and tendons to the mass matrix, Jᵀ (-h ∂f/∂v) J, where actuator forces are not at their
-/// bounds (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`), and what that has on the right-hand side in `acceleration`.
-#[inline(always)]
-pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let dt = C::F::k(m.dt);
-    for &k in &m.actuators.damped {
-        let actuator = &m.actuators.all[k];
-        // ∂force/∂v = g₂ input + b₂
-        let input = input(cx, b, actuator, k);
-        let velocity_factor = |which: Param, fixed: [<C::F as Num>::Real; 3]| {
-            param(m, &b.params, which, 3 * k + 2, fixed[2])
-        };
-        let gain = velocity_factor(Param::ActuatorGain, actuator.gain);
-        let slope = gain.fma(input, velocity_factor(Param::ActuatorBias, actuator.bias));
-        let mut damping = -(slope * dt);
-        // a force at its bound does not change with the velocity: no damping in that world
-        if let Some([least, most]) = force_range(m, &b.params, k) {
-            let force = b.work.actuator_force[k];
-            let within: MaskOf<C> = least.lt(force) & force.lt(most);
-            damping = C::F::select(within, damping, C::F::c(0.0));
-        }
-        // M += Jᵀ (-h ∂force/∂v) J
-        add_product(m, &mut b.work.mass_matrix, &actuator.terms, damping);
-        // the same by moments, and on the right-hand side what MuJoCo's q̈ of free joints has more than ours
-        if let Some(length) = &actuator.turning {
-            let w = &mut b.work;
-            let moments = &w.actuator_moment[length.first..];
-            add_moments(m, &mut w.mass_matrix, &length.dofs, moments, damping);
-            subtract_swing(cx, m, b, length, damping);
-        }
-    }
-    // M += Jᵀ (h damping) J of tendons
-    for tendon in &m.springs.tendons {
-        let damping = C::F::k(tendon.damping) * dt;
-        add_product(m, &mut b.work.mass_matrix, &tendon.terms, damping);
-    }
-}
-
-/// Subtracts x times the part of MuJoCo's J q̈ that ours does not have, from the dofs of the same branch: its acceleration of
-/// a free joint is that of the frame's origin, which differs from that of the centre of mass by ω × (ω × r).
-#[inline(always)]
-fn subtract_swing<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &mut BlockOf<C>,
-    length: &TurningLength<<C::F as Num>::Real>,
-    x: C::F,
-) {
-    for (k, body) in m.bodies.iter().enumerate() {
-        // free bodies that the length depends on
-        let first = length.dofs.iter().position(|&dof| dof == body.dof);
-        let (Motion::Free, Some(first)) = (body.motion, first) else {
-            continue;
-        };
-        // ω × (ω × o), with o = -R c the frame's origin from the centre of mass
-        let omega = Vec3(std::array::from_fn(|i| {
-            cx.get(&b.joint_qd[body.dof + 3 + i])
-        }));
-        let w = &mut b.work;
-        let arm = Vec3::zero() - w.rotation[k] * Vec3::constant(body.center);
-        let swing = omega.cross(omega.cross(arm));
-        // J swing: the swing has no angular part
-        let mut sum = C::F::c(0.0);
-        for i in 0..3 {
-            let moment = w.actuator_moment[length.first + first + i];
-            sum = moment.fma(swing[i], sum);
-        }
-        // acceleration -= Jᵀ x (J swing)
-        for (place, &dof) in length.dofs.iter().enumerate() {
-            if shared(m, dof, body.dof).is_some() {
-                let moment = w.actuator_moment[length.first + place];
-                w.acceleration[dof] = (x * sum).fnma(moment, w.acceleration[dof]);
-            }
-        }
-    }
-}
-
-/// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.
-#[inline(always)]
-fn add_product<F: Num>(
-    m: &Constants<F::Real>,
-    mass_matrix: &mut [F],
-    terms: &[Term<F::Real>],
-    x: F,
-) {
-    // each pair of terms once: the matrix keeps its lower triangle
-    for (i, first) in terms.iter().enumerate() {
-        let scaled = x * F::k(first.coefficient);
-        for second in &terms[..i + 1] {
-            if let Some(place) = shared(m, first.dof, second.dof) {
-                let entry = &mut mass_matrix[place];
-                *entry = scaled.fma(F::k(second.coefficient), *entry);
-            }
-        }
-    }
-}
-
-/// The same of a length with moments, one for each of its dofs.
-#[inline(always)]
-fn add_moments<F: Num>(
-    m: &Constants<F::Real>,
-    mass_matrix: &mut [F],
-    dofs: &[usize],
-    moments: &[F],
-    x: F,
-) {
-    for (i, first) in dofs.iter().enumerate() {
-        let scaled = x * moments[i];
-        for (second, moment) in dofs[..i + 1].iter().zip(moments) {
-            if let Some(place) = shared(m, *first, *second) {
-                mass_matrix[place] = scaled.fma(*moment, mass_matrix[place]);
-            }
-        }
-    }
-}
-
-/// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
-#[inline(always)]
-fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
-    // row of the later dof, which has entries for those on its path to the root alone
-    let (lower, upper) = (first.max(second), first.min(second));
-    let (start, end) = m.dofs[lower].entries;
-    let mut met = m.mass_entries[start..end].iter();
-    met.find(|met| met.other == upper).map(|met| met.place)
 }

@@ -5,6 +5,8 @@
 //! | `command` | commands of this substep: delay and noise |
 //! | `actuation` | drives: PD gains and effort limits |
 //! | `actuators`, `transmission` | actuators: activation, gain, bias, and the lengths along which they act |
+//! | `damping` | damping of actuators and tendons in an implicit step |
+//! | `muscles` | gain, bias and activation of muscles |
 //! | `springs` | springs and dampers of joints and tendons |
 //! | `fluid` | drag of the medium |
 //! | `gravity_compensation` | links that are held against gravity |
@@ -13,8 +15,10 @@
 pub mod actuation;
 pub mod actuators;
 pub mod command;
+pub mod damping;
 pub mod fluid;
 pub mod gravity_compensation;
 pub mod link_forces;
+mod muscles;
 pub mod springs;
 pub mod transmission;

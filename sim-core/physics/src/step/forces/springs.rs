@@ -3,7 +3,7 @@
 //! ```text
 //! smooth -= stiffness (q - rest)                       of a joint
 //! smooth -= stiffness log(rest⁻¹ q)                    of a ball, and of the rotation of a free joint
-//! smooth -= c (stiffness (l - rest) + damping v)       of a tendon with the coefficients c; no spring force between its rests
+//! smooth -= ∂l (stiffness (l - rest) + damping v)      of a tendon of length l; no spring force between its rests
 //! passive = the same - damping q̇                       for output
 //! ```
 //!
@@ -18,7 +18,7 @@ use crate::constants::springs::{PoseSpring, Tendon};
 use crate::lane::{Cx, Num, Real, map};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
-use crate::step::constraints::ties::length;
+use crate::step::lengths::{length, moments, rate};
 use crate::step::tree::free_joints;
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage, param};
@@ -33,6 +33,9 @@ impl Stage for Springs {
         A::Params,
         A::Rotation,
         A::Origin,
+        A::TenLength,
+        A::TenVelocity,
+        A::TenMoment,
         A::SmoothForce,
     ];
     const WRITES: &'static [A] = &[A::SmoothForce];
@@ -71,6 +74,9 @@ impl Stage for Passive {
         A::Origin,
         A::Motion,
         A::Velocity,
+        A::TenLength,
+        A::TenVelocity,
+        A::TenMoment,
     ];
     const WRITES: &'static [A] = &[A::PassiveForce];
 
@@ -112,21 +118,16 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
         let force = &mut to[spring.dof];
         *force = stretch.fnma(C::F::k(spring.stiffness), *force);
     }
-    // stretch, and the rate v = Σ c q̇ of the length
+    // stretch, and the rate v of the length
     for tendon in &m.springs.tendons {
         let stretch = stretch(cx, m, b, tendon);
-        let mut velocity = C::F::c(0.0);
-        for term in &tendon.terms {
-            let qd = cx.get(&b.joint_qd[term.dof]);
-            velocity = qd.fma(C::F::k(term.coefficient), velocity);
-        }
-        // stiffness stretch + damping v, on each joint times its coefficient
+        let velocity = rate(cx, b, &tendon.length);
+        // stiffness stretch + damping v, on each joint times its moment
         let damped = velocity * C::F::k(tendon.damping);
         let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
-        for term in &tendon.terms {
-            let force = &mut to[term.dof];
-            *force = pull.fnma(C::F::k(term.coefficient), *force);
-        }
+        moments::<C>(m, &b.work.ten_moment, &tendon.length, |dof, moment| {
+            to[dof] = pull.fnma(moment, to[dof]);
+        });
     }
     // stiffness times the slide and the rotation vector from rest
     for spring in &m.springs.poses {
@@ -179,7 +180,7 @@ pub(in crate::step) fn stretch<C: Cx>(
     b: &BlockOf<C>,
     tendon: &Tendon<<C::F as Num>::Real>,
 ) -> C::F {
-    let length = length(cx, m, b, &tendon.terms);
+    let length = length(cx, m, b, &tendon.length);
     // 0 between the rests
     let [shortest, longest] = tendon.rest.map(C::F::k);
     length - length.max(shortest).min(longest)

@@ -5,13 +5,15 @@
 //! free    l = 0         force = gear, torque = gear        at its frame's origin
 //! site    l = 0         force = R gear, torque = R gear    at the site
 //! site    l = gear · (R'ᵀ (x - x'), θ)                     to a second site with R', x'; θ from its axes to those of the first
+//! tendon  l = gear L                                      of a spatial tendon
+//! slider  l = gear (a · d - √((a · d)² + r² - d²))        d: from the slider to the crank, a: the slider's axis, r: the rod
 //! ```
 //!
 //! A moment is ∂l̇/∂q̇ of a dof. As in MuJoCo, dofs that move both sites have none.
 
 use crate::arrays::Workspace;
 use crate::constants::Constants;
-use crate::constants::actuators::{LengthKind, Sites, TurningLength};
+use crate::constants::actuators::{LengthKind, Sites, SliderCrank, TurningLength};
 use crate::lane::{Cx, Num};
 use crate::math::quat;
 use crate::math::spatial::Spatial;
@@ -56,6 +58,15 @@ pub(in crate::step) fn measure<C: Cx>(
             C::F::c(0.0)
         }
         LengthKind::Site(sites) => of_sites(m, &mut b.work, length, sites, [along, about]),
+        LengthKind::Tendon(tendon) => {
+            // gear L, and its moments
+            let first = m.tendons[*tendon].first;
+            for k in 0..length.dofs.len() {
+                b.work.actuator_moment[length.first + k] = b.work.ten_moment[first + k] * x;
+            }
+            b.work.ten_length[*tendon] * x
+        }
+        LengthKind::SliderCrank(crank) => of_slider(m, &mut b.work, length, crank, x),
     }
 }
 
@@ -67,6 +78,46 @@ pub(in crate::step) fn moments<'a, F: Num>(
 ) -> &'a mut [F] {
     let end = length.first + length.dofs.len();
     &mut w.actuator_moment[length.first..end]
+}
+
+/// Where the rod cannot reach, the length is a · d.
+#[inline(always)]
+fn of_slider<F: Num>(
+    m: &Constants<F::Real>,
+    w: &mut Workspace<F>,
+    length: &TurningLength<F::Real>,
+    parts: &SliderCrank<F::Real>,
+    gear: F,
+) -> F {
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let slider = placed(w, &parts.slider);
+    let crank = placed(w, &parts.crank);
+    let axis = slider.rotation[2];
+    let apart = (crank.point - slider.point) + (crank.reference - slider.reference);
+    // a · d, and the root of what is left of the rod
+    let along = apart.dot(axis);
+    let rod = F::k(parts.rod);
+    let left = along.fma(along, rod * rod) - apart.dot(apart);
+    let reaches = zero.lt(left);
+    let root = F::select(reaches, left, one).sqrt();
+    // ∂l/∂d = a (1 - a·d / root) + d / root, and ∂l/∂a = d (1 - a·d / root)
+    let inverse = F::select(reaches, one.div(root), zero);
+    let share = along.fnma(inverse, one);
+    let push = (axis * share + apart * inverse) * gear;
+    let turn = axis.cross(apart * share) * gear;
+    for (k, &dof) in length.dofs.iter().enumerate() {
+        let Spatial([linear, angular]) = w.motion[dof];
+        let mut moment = zero;
+        if carries(m, parts.crank.body, dof) {
+            moment = angular.cross_add(crank.point, linear).dot(push);
+        }
+        if carries(m, parts.slider.body, dof) {
+            let carried = angular.cross_add(slider.point, linear).dot(push);
+            moment = moment - carried + angular.dot(turn);
+        }
+        w.actuator_moment[length.first + k] = moment;
+    }
+    gear * (along - F::select(reaches, root, zero))
 }
 
 #[inline(always)]

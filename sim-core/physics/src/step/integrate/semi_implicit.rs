@@ -33,7 +33,7 @@ use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::forces::{actuators, fluid};
+use crate::step::forces::{actuators, damping, fluid};
 use crate::step::tree::free_joints;
 use crate::step::tree::generalized::keep_accelerations;
 use crate::step::tree::kinematics::read_quat;
@@ -49,6 +49,9 @@ impl Stage for Integrate {
         A::Act,
         A::ActDot,
         A::ActuatorMoment,
+        A::TenMoment,
+        A::ActuatorLength,
+        A::ActuatorVelocity,
         A::ActuatorForce,
         A::Rotation,
         A::Origin,
@@ -155,7 +158,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     }
     // `implicitfast` has the derivatives of actuators, tendons and the medium as well
     if m.integrator == Integrator::ImplicitFast {
-        actuators::add_damping(cx, m, b);
+        damping::add_damping(cx, m, b);
         fluid::add_damping::<C>(m, b);
     }
     // damping of free joints, which is not diagonal in our velocities

@@ -24,6 +24,7 @@ impl Stage for Energy {
         A::Inertia,
         A::Reference,
         A::Arm,
+        A::TenLength,
         A::Params,
     ];
     const WRITES: &'static [A] = &[A::KineticEnergy, A::PotentialEnergy];

@@ -6,9 +6,9 @@
 use super::hull::{Hull, Part};
 use crate::constants::hull::{CORNERS_MAX, HullTables};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::span;
-use crate::step::collide::manifold::select::{select, with_sign};
+use crate::step::collide::manifold::select::with_sign;
 use crate::step::collide::narrow::ShapePose;
 use crate::step::collide::variables::pick3;
 

@@ -10,9 +10,8 @@ use super::restart::Restart;
 use super::simplex::{Distance, Start, gjk_distance};
 use super::support::{Support, minkowski_support};
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{Vec3, select};
 use crate::step::collide::manifold::clipped::Separation;
-use crate::step::collide::manifold::select::select;
 use crate::step::collide::variables::{get3, set3, var3};
 use crate::{break_if, times, when};
 

@@ -11,8 +11,8 @@
 use super::hull::{Hull, Part, vertex_row};
 use super::support::rounding_error;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
-use crate::step::collide::manifold::select::{select, with_sign};
+use crate::math::vec3::{Mat3, Vec3, select};
+use crate::step::collide::manifold::select::with_sign;
 use crate::step::collide::narrow::ShapePose;
 use crate::step::collide::variables::{get3, put3, set3, var3};
 use crate::{break_if, span, when};

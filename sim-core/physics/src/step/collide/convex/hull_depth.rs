@@ -15,8 +15,8 @@ use super::hull_axes::SeparatingAxis;
 use super::restart::Restart;
 use super::support::Support;
 use crate::lane::{Cx, Num, Table};
-use crate::math::vec3::Vec3;
-use crate::step::collide::manifold::select::{select, with_sign};
+use crate::math::vec3::{Vec3, select};
+use crate::step::collide::manifold::select::with_sign;
 use crate::step::collide::variables::{get3, pick3, set3, var3};
 use crate::{each, push, span, when};
 

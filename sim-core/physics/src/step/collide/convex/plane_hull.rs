@@ -11,10 +11,10 @@
 use super::hull::{Hull, Part, vertex_row};
 use super::hull_axes::{BoxReach, Reach};
 use crate::lane::{Cx, Fixed, Num, Real};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::step::collide::manifold::points::Points;
 use crate::step::collide::manifold::reduction::ReductionScore;
-use crate::step::collide::manifold::select::{perpendicular, select};
+use crate::step::collide::manifold::select::perpendicular;
 use crate::step::collide::narrow::ShapePair;
 use crate::step::collide::variables::{get3, pick3, set3, var3};
 use crate::{span, when};

@@ -10,8 +10,7 @@
 use super::restart::Extent;
 use super::support::Support;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::Vec3;
-use crate::step::collide::manifold::select::select;
+use crate::math::vec3::{Vec3, select};
 
 /// Squared lengths count as at least this [m²].
 const TINY: f64 = 1e-30;

@@ -4,8 +4,8 @@
 use super::hull_axes::{Reach, SeparatingAxis};
 use super::prism::Prism;
 use crate::lane::Num;
-use crate::math::vec3::{Mat3, Vec3};
-use crate::step::collide::manifold::select::{column_at, select, transpose};
+use crate::math::vec3::{Mat3, Vec3, select};
+use crate::step::collide::manifold::select::{column_at, transpose};
 
 /// Squared sine below which an edge lies along an axis of the other shape: their common normal is that of a face.
 const ALONG: f64 = 1e-6;

@@ -5,8 +5,7 @@
 use super::hull::Hull;
 use super::hull_axes::{Reach, SeparatingAxis};
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
-use crate::step::collide::manifold::select::select;
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::step::collide::variables::{get3, set3, var3};
 use crate::times;
 

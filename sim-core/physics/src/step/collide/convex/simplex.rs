@@ -6,8 +6,7 @@
 
 use super::support::{Support, minkowski_support};
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::Vec3;
-use crate::step::collide::manifold::select::select;
+use crate::math::vec3::{Vec3, select};
 use crate::step::collide::variables::{get3, set3, var3};
 use crate::{break_if, times};
 

@@ -5,11 +5,10 @@
 //! world leaves it once its own corners are done.
 
 use super::reduction::ReductionScore;
-use super::select::select;
 use crate::constants::clip::Cut;
 use crate::constants::hull::CORNERS_MAX;
 use crate::lane::{Cx, MaskOf, Num, Table};
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{Vec3, select};
 use crate::step::collide::variables::{get3, load_each3, set3, var3};
 use crate::{break_if, times};
 

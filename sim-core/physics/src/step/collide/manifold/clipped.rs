@@ -8,10 +8,10 @@
 
 use super::clip::{Clip, ClipPlane, NO_CANDIDATE, deepest_candidate, farthest_candidate};
 use super::points::Points;
-use super::select::{perpendicular, select};
+use super::select::perpendicular;
 use crate::constants::hull::CORNERS_MAX;
 use crate::lane::{Cx, Num};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::step::collide::convex::features::Feature;
 use crate::step::collide::convex::support::rounding_error;
 use crate::step::collide::narrow::ShapePair;

@@ -1,7 +1,7 @@
 //! Branch-free choices among components and columns, by an index that differs per world.
 
 use crate::lane::Num;
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 
 /// Smaller divisors count as this one, so that a reciprocal stays finite.
 const TINY: f64 = 1e-30;
@@ -36,16 +36,6 @@ pub fn sign<F: Num>(x: F) -> F {
 #[inline(always)]
 pub fn with_sign<F: Num>(size: F, x: F) -> F {
     F::select(x.lt(F::c(0.0)), -size, size)
-}
-
-/// `a` where the mask holds, else `b`.
-#[inline(always)]
-pub fn select<F: Num>(mask: F::Mask, a: Vec3<F>, b: Vec3<F>) -> Vec3<F> {
-    Vec3([
-        F::select(mask, a[0], b[0]),
-        F::select(mask, a[1], b[1]),
-        F::select(mask, a[2], b[2]),
-    ])
 }
 
 /// A unit vector perpendicular to the unit vector `a`.

@@ -4,10 +4,10 @@
 
 use super::boxes::BoxAxis;
 use crate::lane::{Cx, MaskOf, Num, Real};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::step::collide::manifold::points::Points;
 use crate::step::collide::manifold::select::{
-    cycle_columns, cycle_components, largest_axis, reciprocal, select, sign,
+    cycle_columns, cycle_components, largest_axis, reciprocal, sign,
 };
 use crate::step::collide::narrow::ShapePair;
 

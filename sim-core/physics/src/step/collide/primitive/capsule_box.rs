@@ -21,10 +21,10 @@
 
 use super::capsules::{CapsuleAxis, add_ball_at};
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{Vec3, select};
 use crate::step::collide::manifold::points::Points;
 use crate::step::collide::manifold::select::{
-    clamp_to_box, component_at, largest_axis, min_component, reciprocal, select, sign, zero_at,
+    clamp_to_box, component_at, largest_axis, min_component, reciprocal, sign, zero_at,
 };
 use crate::step::collide::narrow::ShapePair;
 

@@ -3,9 +3,9 @@
 //! The plane is z = 0 of the first shape, so the normal is its z axis. The distance of a point x of the other shape is n · x.
 
 use crate::lane::{Cx, Num, Real};
-use crate::math::vec3::Vec3;
+use crate::math::vec3::{Vec3, select};
 use crate::step::collide::manifold::points::Points;
-use crate::step::collide::manifold::select::{select, sign};
+use crate::step::collide::manifold::select::sign;
 use crate::step::collide::narrow::ShapePair;
 
 /// Half the side of an equilateral triangle in a circle, relative to its radius: √3/2.

@@ -3,9 +3,9 @@
 //! The centre of the first shape, the sphere, is the origin.
 
 use crate::lane::{Cx, MaskOf, Num};
-use crate::math::vec3::{Mat3, Vec3};
+use crate::math::vec3::{Mat3, Vec3, select};
 use crate::step::collide::manifold::points::Points;
-use crate::step::collide::manifold::select::{clamp_to_box, column_at, min_component, select};
+use crate::step::collide::manifold::select::{clamp_to_box, column_at, min_component};
 use crate::step::collide::narrow::ShapePair;
 
 /// Centres this near coincide [m], and axes with this sine are parallel [–]: the normal is then across both shapes' axes z, or

@@ -10,7 +10,7 @@ use crate::math::quat;
 use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::Vec3;
 use crate::step::constraints::joint_rows::range;
-use crate::step::constraints::ties::length;
+use crate::step::lengths::length;
 use crate::step::outputs::sites::reference;
 use crate::step::outputs::sites::{position, to_local};
 use crate::step::outputs::subtrees::root_center;
@@ -120,6 +120,7 @@ impl Stage for Forces {
         A::JointQ,
         A::JointQd,
         A::Params,
+        A::TenLength,
         A::ActuatorForce,
         A::QfrcActuator,
         A::EfcD,

@@ -10,12 +10,11 @@ use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::sensors::{FramePart, FrameSensor, SensorKind, SubtreePart};
 use crate::constants::site::Mount;
-use crate::constants::springs::Term;
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{conjugate, mul};
 use crate::math::spatial::{ANGULAR, LINEAR};
 use crate::math::vec3::Vec3;
-use crate::step::constraints::ties::length;
+use crate::step::lengths::{length, rate};
 use crate::step::outputs::sites::{axes, orientation, position, reference, to_local, velocity};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
@@ -31,6 +30,8 @@ impl Stage for States {
         A::Reference,
         A::Velocity,
         A::Orientation,
+        A::TenLength,
+        A::TenVelocity,
         A::ActuatorLength,
         A::ActuatorVelocity,
         A::Sensordata,
@@ -61,8 +62,8 @@ impl Stage for States {
                 SensorKind::Vector(mount, vector) => {
                     &to_local(&b.work, mount, Vec3::constant(*vector)).0
                 }
-                SensorKind::Length(terms) => &[length(cx, m, b, terms)],
-                SensorKind::Rate(terms) => &[rate(cx, b, terms)],
+                SensorKind::Length(of) => &[length(cx, m, b, of)],
+                SensorKind::Rate(of) => &[rate(cx, b, of)],
                 SensorKind::ActuatorLength(k) => &[b.work.actuator_length[*k]],
                 SensorKind::ActuatorRate(k) => &[b.work.actuator_velocity[*k]],
                 SensorKind::BallQuat(coord) => {
@@ -82,18 +83,6 @@ impl Stage for States {
             put(&mut b.work.sensordata, sensor, scalars);
         }
     }
-}
-
-/// Σ c q̇
-#[inline(always)]
-fn rate<C: Cx>(cx: &mut C, b: &BlockOf<C>, terms: &[Term<<C::F as Num>::Real>]) -> C::F {
-    let mut rate = C::F::c(0.0);
-    for term in terms {
-        rate = cx
-            .get(&b.joint_qd[term.dof])
-            .fma(C::F::k(term.coefficient), rate);
-    }
-    rate
 }
 
 /// Orientation of a frame, (w, x, y, z).

@@ -1,10 +1,10 @@
-//! What actuators of a model act on: joints, fixed tendons, sites.
+//! What actuators of a model act on: joints, tendons, sites.
 
-use super::format::ModelFile;
-use super::frame;
-use super::tendons::{Tendons, moving};
-use crate::description::{ActuatorLength, JointKind, Robot};
+use crate::description::{ActuatorLength, JointKind, Length, Robot};
 use crate::error::ModelError;
+use crate::mujoco::format::ModelFile;
+use crate::mujoco::frame;
+use crate::mujoco::tendons::{Tendons, moving};
 use crate::pose::Pose;
 
 /// Arrays of transmissions.
@@ -18,6 +18,8 @@ pub(super) struct Transmissions<'a> {
     tendons: Tendons,
     /// Link and frame of each site.
     sites: Vec<(usize, Pose)>,
+    /// Lengths of the rods of slider-cranks; empty where a file has none [m].
+    rods: Vec<f64>,
 }
 
 impl<'a> Transmissions<'a> {
@@ -40,15 +42,24 @@ impl<'a> Transmissions<'a> {
             let body = body.ok_or_else(|| file.fault("has a site without a body".to_owned()))?;
             Ok((body, frame(pos, quat)))
         });
+        let kinds = file.kinds("actuator_trntype", count)?;
         Ok(Transmissions {
-            kinds: file.kinds("actuator_trntype", count)?,
             targets: file.vectors_of_integers::<2>("actuator_trnid", count)?,
             gears: file.vectors::<6>("actuator_gear", count)?,
             joints: joints.collect(),
             tendons: Tendons::read(file, robot)?,
             sites: sites.collect::<Result<_, ModelError>>()?,
+            rods: match kinds.iter().any(|kind| kind == "mjTRN_SLIDERCRANK") {
+                true => file.reals("actuator_cranklength", count)?,
+                false => Vec::new(),
+            },
+            kinds,
             file,
         })
+    }
+
+    fn site(&self, index: i64) -> Option<&(usize, Pose)> {
+        self.sites.get(usize::try_from(index).ok()?)
     }
 
     /// What actuator `k` acts on.
@@ -63,16 +74,28 @@ impl<'a> Transmissions<'a> {
         let kind = self.kinds[k].as_str();
         let in_parent = kind == "mjTRN_JOINTINPARENT";
         match kind {
-            "mjTRN_TENDON" => {
-                let terms = self.tendons.terms(self.file, target)?.iter();
-                let terms = terms.map(|&(joint, coefficient)| (joint, coefficient * gear[0]));
-                Ok(ActuatorLength::Joints(terms.collect()))
-            }
+            "mjTRN_TENDON" => Ok(match self.tendons.length(self.file, target)? {
+                Length::Joints(terms) => {
+                    let terms = terms.iter();
+                    let terms = terms.map(|&(joint, coefficient)| (joint, coefficient * gear[0]));
+                    ActuatorLength::Joints(terms.collect())
+                }
+                &Length::Spatial(tendon) => ActuatorLength::Tendon {
+                    tendon,
+                    gear: gear[0],
+                },
+            }),
+            "mjTRN_SLIDERCRANK" => Ok(ActuatorLength::SliderCrank {
+                crank: self.sites.get(place).cloned().ok_or_else(fault)?,
+                slider: self.site(other).cloned().ok_or_else(fault)?,
+                rod: *self.rods.get(k).ok_or_else(fault)?,
+                gear: gear[0],
+            }),
             "mjTRN_SITE" => Ok(ActuatorLength::Site {
                 site: self.sites.get(place).cloned().ok_or_else(fault)?,
-                reference: match usize::try_from(other) {
-                    Ok(other) => Some(self.sites.get(other).cloned().ok_or_else(fault)?),
-                    Err(_) => None,
+                reference: match other < 0 {
+                    true => None,
+                    false => Some(self.site(other).cloned().ok_or_else(fault)?),
                 },
                 gear,
             }),

@@ -1,12 +1,16 @@
 //! Actuators of a model: their laws and activations.
 
+pub(super) mod muscles;
+mod transmissions;
+
 use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
-use super::transmissions::Transmissions;
 use crate::description::{Actuator, ActuatorActivation, Robot};
 use crate::error::ModelError;
-use sim_physics::constants::actuators::ActivationRate;
+use muscles::{Law, Muscles};
+use sim_physics::constants::actuators::{ActivationRate, MuscleRate};
+use transmissions::Transmissions;
 
 /// Adds the actuators; [`super::refusals`] has named those that are not supported.
 pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), ModelError> {
@@ -16,6 +20,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let activations = Activations::read(file, count)?;
     let (gain_kinds, gains) = laws(file, "gain", count)?;
     let (bias_kinds, biases) = laws(file, "bias", count)?;
+    let muscles = Muscles::read(file, count)?;
     let clamps = !has_flag(file, "mjDSBL_CLAMPCTRL")?;
     let ctrl_ranges = ranges(file, "ctrl", count)?;
     let force_ranges = ranges(file, "force", count)?;
@@ -35,12 +40,15 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
             force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match gain_kinds[k].as_str() {
                 "mjGAIN_AFFINE" => gains[k],
+                "mjGAIN_MUSCLE" => [0.0; 3],
                 _ => [gains[k][0], 0.0, 0.0],
             }),
             bias: on(match bias_kinds[k].as_str() {
                 "mjBIAS_AFFINE" => biases[k],
                 _ => [0.0; 3],
             }),
+            muscle_gain: muscles.law(k, gain_kinds[k] == "mjGAIN_MUSCLE" && is_on, Law::Gain),
+            muscle_bias: muscles.law(k, bias_kinds[k] == "mjBIAS_MUSCLE" && is_on, Law::Bias),
         });
     }
     if let Some(parts) = &mut robot.precompiled {
@@ -114,6 +122,10 @@ impl Activations {
         let rate = match self.kinds[k].as_str() {
             "mjDYN_NONE" => return None,
             "mjDYN_INTEGRATOR" => ActivationRate::Control,
+            "mjDYN_MUSCLE" => {
+                let [rise, fall, width, ..] = self.parameters[k];
+                ActivationRate::Muscle(MuscleRate { rise, fall, width })
+            }
             _ => ActivationRate::Filter(time),
         };
         Some(ActuatorActivation {
