@@ -29,7 +29,7 @@ ROBOT = """
 <sensor><accelerometer name="imu" site="top"/><jointpos name="where" joint="x"/></sensor>
 <keyframe><key name="home" qpos="0.5 0.1"/></keyframe></mujoco>"""
 ROBOT = HEAD + ROBOT.lstrip()
-MUSCLE = ROBOT.replace("<actuator>", '<actuator><muscle name="calf" joint="x" ctrlrange="0 1" lengthrange="0 1"/>')
+ADHESION = ROBOT.replace("<actuator>", '<actuator><adhesion name="pad" body="cart" ctrlrange="0 1"/>')
 
 
 @pytest.fixture(autouse=True)
@@ -95,10 +95,10 @@ def test_json_has_the_same_facts(tmp_path):
 
 def test_everything_that_is_refused_is_named(tmp_path):
     legs = "".join(f'<geom name="egg{k}" type="ellipsoid" size=".1 .2 .3"/>' for k in range(9))
-    path = file_of(tmp_path, MUSCLE.replace('<site name="top"/>', f'<site name="top"/>{legs}'))
+    path = file_of(tmp_path, ADHESION.replace('<site name="top"/>', f'<site name="top"/>{legs}'))
     done = inspected(tmp_path, path)
     assert done.returncode == 1
-    for name in (*(f"geom `egg{k}`" for k in range(9)), "actuator `calf`"):
+    for name in (*(f"geom `egg{k}`" for k in range(9)), "actuator `pad`"):
         assert name in done.stdout, name
     assert "robot.xml: 10 of its elements" in done.stderr and "remove" in done.stderr
     done = inspected(tmp_path, path, "--json")
