@@ -134,6 +134,40 @@ def test_lengths_of_tendons_that_begin_to_touch_are_near_in_single_precision(sha
     np.testing.assert_allclose(found[1], found[0], rtol=1e-4)
 
 
+MUSCLES = """<mujoco><option gravity="0 0 0"><flag contact="disable"/></option><worldbody>
+    <geom name="shape" size="0.1" pos="0.2 0 0"/><site name="origin" pos="0 0 0.1"/>
+    <body pos="0.4 0 0"><joint axis="0 1 0" damping="1"/><geom size="0.05" mass="1"/><site name="tip" pos="0.1 0 0.1"/>
+    </body>
+    </worldbody>
+    <tendon><spatial name="line"><site site="origin"/><geom geom="shape"/><site site="tip"/></spatial></tendon>
+    <actuator><muscle name="m" tendon="line" force="5" lengthrange="0.2 0.8" ctrlrange="0 1"/></actuator></mujoco>"""
+
+
+def test_a_model_moves_as_alone_beside_another_one_with_tendons() -> None:
+    """Tendons, moments and actuators of the second model are counted on from the first one's."""
+    model = mujoco.MjModel.from_xml_string(MUSCLES)
+    found = []
+    for names in (("first",), ("first", "second")):
+        scene = tl.Scene.from_mujoco(model, name=names[0])
+        for name in names[1:]:
+            scene.add_mujoco(model, name=name)
+        with tl.launch(scene, worlds=1, precision="f64", fields=("qpos",)) as sim:
+            for _ in range(50):
+                frame = sim.step(ctrl=np.full((1, len(names)), 0.7))
+            found.append(np.array(frame.qpos[0]))
+    assert abs(found[0][0]) > 1e-4
+    assert (found[1] == found[0][0]).all()
+
+
+def test_a_batch_names_a_muscle_whose_numbers_differ() -> None:
+    batch = tl.mujoco.Batch(mujoco.MjModel.from_xml_string(MUSCLES), 4)
+    gains = batch.expand("actuator_gainprm")
+    batch.step()
+    gains[2, 0, 2] *= 2
+    with pytest.raises(TightloopError, match="sim 2: actuator_gainprm of a muscle cannot differ"):
+        batch.step()
+
+
 def test_inverse_kinematics_names_an_equality_of_spatial_tendons() -> None:
     xml = around("sphere", None).replace(
         "<sensor>", '<equality><tendon name="held" tendon1="line"/></equality><sensor>'

@@ -110,7 +110,7 @@ fn subtract_swing<C: Cx>(
 
 /// Adds Jᵀ x J to the mass matrix, J with the coefficients of a length.
 #[inline(always)]
-pub(in crate::step) fn add_product<F: Num>(
+fn add_product<F: Num>(
     m: &Constants<F::Real>,
     mass_matrix: &mut [F],
     terms: &[Term<F::Real>],
@@ -130,7 +130,7 @@ pub(in crate::step) fn add_product<F: Num>(
 
 /// The same of a length with moments, one for each of its dofs.
 #[inline(always)]
-pub(in crate::step) fn add_moments<F: Num>(
+fn add_moments<F: Num>(
     m: &Constants<F::Real>,
     w: &mut Workspace<F>,
     dofs: &[usize],
@@ -149,7 +149,7 @@ pub(in crate::step) fn add_moments<F: Num>(
 
 /// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
 #[inline(always)]
-pub(in crate::step) fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
+fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
     // row of the later dof, which has entries for those on its path to the root alone
     let (lower, upper) = (first.max(second), first.min(second));
     let (start, end) = m.dofs[lower].entries;

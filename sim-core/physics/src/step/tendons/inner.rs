@@ -115,14 +115,14 @@ fn solve<C: Cx>(cx: &mut C, equation: &Equation<C::F>, solves: MaskOf<C>) -> C::
     let mut above_max = cx.var(zero);
     when!(cx, solves, {
         times!(cx, ITERATIONS, {
-            let here = cx.get(&alpha);
-            let [rest, slope] = equation.at(here);
+            let guess = cx.get(&alpha);
+            let [rest, slope] = equation.at(guess);
             let is_lost = cx.get(&above_max).lt(rest);
             break_if!(cx, is_lost);
             // a select: a slope of 0 has no next point
             let falls = slope.lt(C::F::c(-TINY));
-            let next = here - rest.div(C::F::select(falls, slope, C::F::c(-1.0)));
-            let next = C::F::select(falls, next.max(zero).min(most), here);
+            let next = guess - rest.div(C::F::select(falls, slope, C::F::c(-1.0)));
+            let next = C::F::select(falls, next.max(zero).min(most), guess);
             cx.set(&mut answer, next);
             break_if!(cx, !small.lt(rest.abs()));
             cx.set(&mut alpha, next);

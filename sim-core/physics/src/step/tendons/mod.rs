@@ -91,8 +91,8 @@ fn measure<C: Cx>(cx: &mut C, w: &mut Workspace<C::F>, span: &Span<<C::F as Num>
     let last = rotation.transpose_mul(apart(w, (&span.to, to), (&around.at, center)));
     let side = match &around.side {
         Some(side) => {
-            let there = apart(w, (side, position(w, side)), (&around.at, center));
-            Some(rotation.transpose_mul(there))
+            let offset = apart(w, (side, position(w, side)), (&around.at, center));
+            Some(rotation.transpose_mul(offset))
         }
         None => None,
     };
@@ -171,10 +171,10 @@ fn swing_of<F: Num>(
     let mut swing = F::c(0.0);
     // the frame's origin is kept relative to the centre of mass
     let omega = w.velocity[body][ANGULAR];
-    let more = omega.cross(omega.cross(w.origin[body]));
+    let acceleration = omega.cross(omega.cross(w.origin[body]));
     for i in 0..3 {
         let moment = w.ten_moment[tendon.first + place + i];
-        swing = moment.fma(more[i], swing);
+        swing = moment.fma(acceleration[i], swing);
     }
     swing
 }
