@@ -8,7 +8,7 @@ Observations are read where the environment puts them, a ring of slots; each is 
 an action led to is learned from with generalised advantages (arXiv 1506.02438); an episode that was cut off is
 continued by the critic's value of its last observation. The learning rate follows the change of the policy (its KL
 divergence). With ``--mirror`` actor and critic are symmetric by construction, so that a step to the left teaches one to
-the right.
+the right. With ``--muon`` hidden layers learn by Muon, the others by Adam.
 
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
 TensorBoard, the curve as CSV and PNG, and the policy as ONNX with its metadata, which ``examples/play.py`` runs.
@@ -38,7 +38,7 @@ from typing import Any
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numpy as np
-from learning.config import MINUTES, PRESETS, Config
+from learning.config import PRESETS, ROBOTS, Config
 from learning.films import Films
 from learning.log import Log, Statistics
 from learning.places import OUT, PLAY
@@ -56,6 +56,7 @@ from tightloop.whole_files import whole_file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     from learning.agent import Agent
+    from learning.optimizer import Optimizer
     from learning.rollout import Rollout
     from policy_file import export
     from torch import Tensor, nn
@@ -99,7 +100,7 @@ class Trainer:
         if config.mirror and self.envs.mirror is None:
             print(f"{task}: no mirror image of the robot is known, so actor and critic are plain", file=sys.stderr)
         self.agent = Agent(*sizes, mirrors=self.envs.mirror if config.mirror else None).to(self.device)
-        self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5, fused=True)
+        self.optimizer = Optimizer(self.agent, config.lr, muon=config.muon)
         self.acting = copy.deepcopy(self.agent)
         self.rollouts = [Rollout(config, inputs, actions, critic_inputs, self.device) for _ in range(2)]
         # one each: the threads that collect and learn run at once
@@ -195,7 +196,7 @@ class Trainer:
                     std = torch.exp(agent.log_std)
                     change = (std_old**2 + (mean - mean_old) ** 2) / (2.0 * std**2)
                     kl = (torch.log(std / std_old) + change - 0.5).sum(-1).mean().item()
-                self._follow(kl, progress)
+                self.optimizer.follow(kl, config.kl * (1.0 - 0.9 * progress**4))
                 self.optimizer.step()
                 moved.append(kl)
                 losses.append(off.item())
@@ -204,7 +205,7 @@ class Trainer:
             "learn/kl_nats": float(np.mean(moved)),
             "learn/value_loss": float(np.mean(losses)),
             "learn/action_std": float(std_old.mean()),
-            "learn/learning_rate": self.optimizer.param_groups[0]["lr"],
+            "learn/learning_rate": self.optimizer.lr,
         }
 
     @property
@@ -212,14 +213,6 @@ class Trainer:
         """Share of the run that is over, from 0 to 1."""
         minutes, total = self.config.minutes, self.config.total
         return min(1.0, self.steps / total if total else self.seconds / (60.0 * minutes))
-
-    def _follow(self, kl: float, progress: float) -> None:
-        """Let the learning rate follow how much the policy changes."""
-        group, aim = self.optimizer.param_groups[0], self.config.kl * (1.0 - 0.9 * progress**4)
-        if kl > 2.0 * aim:
-            group["lr"] = max(1e-5, group["lr"] / 1.2)
-        elif 0.0 < kl < 0.5 * aim:
-            group["lr"] = min(3e-3, group["lr"] * 1.2)
 
     @torch.no_grad()
     def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -342,8 +335,8 @@ def main() -> None:
     args = parser.parse_args()
     own = {option.name: getattr(args, option.name) for option in fields(Config)}
     preset = PRESETS.get(args.task, Config())
-    if args.model in MINUTES:
-        preset = replace(preset, minutes=MINUTES[args.model])
+    if args.model in ROBOTS:
+        preset = replace(preset, **ROBOTS[args.model])
     elif args.model is not None:  # its gains and weights are found, not tuned
         preset = replace(preset, minutes=max(preset.minutes, MODEL_MINUTES))
     config = replace(preset, **{name: value for name, value in own.items() if value is not None})

@@ -196,6 +196,16 @@ class Agent(nn.Module):
             self.critic = MirrorMlp(self.halves[1], hidden, None, 1.0)
         self.log_std = nn.Parameter(torch.full((actions,), math.log(std)))
 
+    def hidden_weights(self) -> list[nn.Parameter]:
+        """Return the weight matrices that lead to hidden units."""
+        layers: list[nn.Module] = []
+        for network in (self.actor, self.critic):
+            if isinstance(network, MirrorMlp):
+                layers += [half for layer in (network.first, network.second) for half in (layer.even, layer.odd)]
+            else:
+                layers += [network[0], network[2]]
+        return [layer.weight for layer in layers if isinstance(layer, nn.Linear)]
+
     def see(self, obs: Tensor, critic_obs: Tensor) -> None:
         """Take observations into account by which later ones are shifted and scaled."""
         halves = self.halves or (None, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Config:
     grad_max: float = 1.0  # norm of a gradient, at most
     reward_scale: float = 1.0  # of the rewards that are learned from, which should be some hundredths a step
     mirror: bool = False  # whether actor and critic are symmetric, if the task has a mirror image
+    muon: bool = False  # whether hidden layers learn by Muon instead of Adam; needs torch 2.9
     evaluate: float = 15.0  # seconds between evaluations
     film_every: float = 0.0  # minutes between films of the policy; 0 for none
     total: int = 0  # env steps after which to stop, instead of minutes; the same run then has the same bits
@@ -51,7 +53,18 @@ PRESETS = {
         5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
     ),
     "QuadrupedVelocityRough": Config(
-        30.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, anneal=True, kl=0.03, std=0.7, mirror=True, evaluate=120.0
+        30.0,
+        512,
+        16,
+        epochs=2,
+        gamma=0.98,
+        entropy=0.004,
+        anneal=True,
+        kl=0.03,
+        std=0.7,
+        mirror=True,
+        muon=True,
+        evaluate=120.0,
     ),
     "HumanoidVelocityFlat": Config(
         20.0, 512, 16, epochs=2, gamma=0.99, entropy=0.004, kl=0.04, std=0.6, mirror=True, evaluate=60.0
@@ -60,5 +73,8 @@ PRESETS = {
     "Ant-v5": Config(10.0, 1024, 16, epochs=4, kl=0.02, std=0.4, reward_scale=0.02, evaluate=60.0),
     "FrankaLift": Config(minutes=30.0, num_envs=2048, gamma=0.98, hidden=256, entropy=0.005, evaluate=60.0),
 }
-#: Minutes for robots that tightloop knows by name; their other numbers are those of the task.
-MINUTES = {"unitree_g1": 10.0, "unitree_go1": 3.0}
+#: What differs from the task's numbers for robots that tightloop knows by name.
+ROBOTS: dict[str, dict[str, Any]] = {
+    "unitree_g1": {"minutes": 10.0},
+    "unitree_go1": {"minutes": 3.0, "muon": True},
+}
