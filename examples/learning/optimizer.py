@@ -65,6 +65,6 @@ class Optimizer:
     def load_state_dict(self, states: list[dict[str, Any]]) -> None:
         """Go on from there."""
         if not isinstance(states, list) or len(states) != len(self.parts):
-            raise SystemExit("the checkpoint was written with another --muon, or by an older ppo.py; start anew")
+            raise SystemExit("the checkpoint has another optimizer; give --muon or --no-muon as before, or start anew")
         for part, state in zip(self.parts, states, strict=True):
             part.load_state_dict(state)
