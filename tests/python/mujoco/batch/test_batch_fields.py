@@ -202,12 +202,19 @@ def test_a_reset_puts_each_simulation_at_its_own_reference() -> None:
         np.testing.assert_allclose(qpos[0, -1], model.qpos0[-1])
 
 
-def test_compensation_of_a_model_without_any_stays_off() -> None:
+def test_compensation_of_a_model_without_any_starts_with_set_const() -> None:
     model = mujoco.MjModel.from_xml_string(XML.format(cone="pyramidal", integrator="Euler").replace("gravcomp", "user"))
     models = separate(model)
     with Batch(model, N, 1, precision="f64") as batch:
         batch.expand("body_gravcomp")[:] = 1.0
         lockstep = Lockstep(batch, models)
+        lockstep.step(nstep=5)
+        lockstep.assert_equal(("qpos", "qvel"), 1e-9)
+        some = np.arange(0, N, 2)
+        batch.set_const(some)
+        for sim in some:
+            models[sim].body_gravcomp[:] = 1.0
+            mujoco.mj_setConst(models[sim], mujoco.MjData(models[sim]))
         lockstep.step(nstep=5)
         lockstep.assert_equal(("qpos", "qvel"), 1e-9)
 

@@ -9,6 +9,8 @@ from batch_reference import FIELDS, XML, Lockstep, N, model_of, positions, separ
 
 from tightloop.mujoco import Batch
 
+RAYS = 64
+
 
 def test_every_bound_field_has_the_shape_and_dtype_of_mjdata() -> None:
     model = model_of()
@@ -174,17 +176,56 @@ def test_equalities_are_switched_in_each_simulation() -> None:
         assert (active == 1).all()
 
 
-def test_rays_and_jacobians_are_refused_where_a_model_would_differ() -> None:
-    model = model_of()
+@pytest.mark.parametrize(
+    ("field", "place", "change"),
+    [
+        ("geom_size", (1, 0), 0.05),
+        ("geom_pos", (3, 0), 0.3),
+        ("body_pos", (1, 2), 0.2),
+        ("jnt_axis", (0, 1), 0.4),
+        ("geom_type", (1,), int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)),
+        ("geom_group", (1,), 3),
+    ],
+)
+def test_rays_and_jacobians_see_the_geoms_of_each_simulation(field, place, change) -> None:
+    model, rng = model_of(), np.random.default_rng(0)
+    # from all around towards the cart and what it carries
+    pnt = rng.uniform(-1.0, 1.0, (N, RAYS, 3)) + np.array([0.0, 0.0, 1.0])
+    vec = rng.uniform([-0.12, -0.06, 0.94], [0.15, 0.06, 1.65], (N, RAYS, 3)) - pnt
+    point, body = rng.uniform(-1.0, 1.0, (N, 3)), np.full(N, 3, np.int32)
+    dist, geomid, jacp = np.zeros((N, RAYS)), np.zeros((N, RAYS), np.int32), np.zeros((N, 3, model.nv))
+    groups = np.array([1, 1, 1, 0, 0, 0], np.uint8)
     with Batch(model, N, 1, precision="f64") as batch:
-        pnt, vec, dist = np.zeros((N, 1, 3)), np.tile([0.0, 0.0, -1.0], (N, 1, 1)), np.zeros((N, 1))
-        for name in ("geom_pos", "geom_rgba"):
-            values = batch.expand(name)
+        batch.rays(pnt, vec, dist, geomgroup=groups)
+        batch.jac(jacp, None, point, body)
+        before = dist[2].copy(), jacp[2].copy()
+        values = batch.expand(field)
+        values[2][place] = change if "i" in values.dtype.kind else values[2][place] + change
+        batch.rays(pnt, vec, dist, geomid, geomgroup=groups)
+        batch.jac(jacp, None, point, body)
+        assert (dist[2] != before[0]).any() or (jacp[2] != before[1]).any(), "the change has an effect"
+        qpos, hit = batch.bind("qpos"), np.zeros(1, np.int32)
+        for sim in range(N):
+            own = separate(model)[sim]
+            getattr(own, field)[:] = values[sim]
+            data = mujoco.MjData(own)
+            data.qpos[:] = qpos[sim]
+            mujoco.mj_kinematics(own, data)
+            mujoco.mj_comPos(own, data)
+            for ray in range(RAYS):
+                far = mujoco.mj_ray(own, data, pnt[sim, ray], vec[sim, ray], groups, 1, -1, hit)
+                assert abs(dist[sim, ray] - far) < 1e-9 and geomid[sim, ray] == hit[0]
+            expected = np.zeros((3, model.nv))
+            mujoco.mj_jac(own, data, expected, None, point[sim], int(body[sim]))
+            np.testing.assert_allclose(jacp[sim], expected, atol=1e-12)
+        other = batch.expand("body_weldid")
+        other[1, 1] = 0
+        with pytest.raises(ValueError, match="sim 1: body_weldid differs"):
             batch.rays(pnt, vec, dist)
-            values[2, 0] += 0.25
-            with pytest.raises(ValueError, match=f"sim 2: {name} differs"):
-                batch.rays(pnt, vec, dist)
-            values[2, 0] -= 0.25
+        other[1, 1] = model.body_weldid[1]
+        if field == "geom_size":
+            with pytest.raises(ValueError, match="sim 2: geom_size differs"):
+                batch.step()
 
 
 def test_masses_in_a_medium_are_not_expanded() -> None:

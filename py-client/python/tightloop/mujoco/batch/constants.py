@@ -55,6 +55,9 @@ def set_const(model: Any, expansions: Expansions, ids: NDArray[np.int64], num_si
                 expansions.get(name, None)
             # what was never expanded is consistent for all simulations at once
             todo += [other for other in range(num_sims) if other not in found and other not in todo]
+    done = np.array([sim for sim in ids if int(sim) in found], int)
+    shares = np.broadcast_to(expansions.of("body_gravcomp"), (num_sims, model.nbody))
+    expansions.compensated[done] = (shares[done] > 0.0).any(axis=1)
     for sim, values in found.items():
         for name, value in values.items():
             if name in expansions.names:

@@ -65,6 +65,8 @@ class Expansions:
         self._model, self._sims, self._instead = model, num_sims, instead
         self._arrays: dict[str, Array] = {}
         self._inertias = masses.Inertias(np.asarray(model.body_iquat))
+        #: Whether MuJoCo compensates gravity at all, ``(num_sims,)``: it skips it until `set_const` finds a share.
+        self.compensated = np.full(num_sims, bool((np.asarray(model.body_gravcomp) > 0.0).any()))
 
     def __contains__(self, name: str) -> bool:
         """Whether ``MjModel`` or ``MjOption`` has a field of this name."""
@@ -165,6 +167,8 @@ class Expansions:
                 found |= field.values(self._model, array, shapes)
             elif name in masses.FIELDS or name in _SOFTNESS:
                 self._check_finite(name, ids)
+        if "body_gravcomp" in found:
+            found["body_gravcomp"] = found["body_gravcomp"] * self.compensated[:, None]
         bodies = self._model.nbody
         wanted = masses.params(self.names)
         if "body_mass" in wanted:
@@ -215,21 +219,25 @@ class Expansions:
         if asleep.any():
             raise ArgumentError(f"sim {ids[int(asleep.argmax())]}: sleep cannot be enabled in a Batch")
 
-    def check_fixed(self, ids: Array, also: tuple[str, ...] = ()) -> None:
-        """Check that fields that cannot differ, and those of ``also``, have the values of the model.
+    def differs(self, name: str, ids: Array) -> NDArray[np.bool_]:
+        """Return in which simulations a field has other values than the model's, ``(len(ids),)``."""
+        array = self._arrays[name]
+        template = np.asarray(self._template(name)).astype(array.dtype)
+        given = array[ids]
+        # NaN is no other value than NaN
+        return ((given != template) & ~(np.isnan(given) & np.isnan(template))).reshape(len(ids), -1).any(axis=1)
+
+    def check_fixed(self, ids: Array, free: tuple[str, ...] = ()) -> None:
+        """Check that fields that cannot differ, but for those of `free`, have the values of the model.
 
         Raises:
             ArgumentError: One has not; the message has the simulation and the field.
         """
         self.check_sleep(ids)
-        for name, array in self._arrays.items():
-            free = name in _VARYING or name in CONSTANTS or is_visual(name)
-            if free and name not in also:
+        for name in self._arrays:
+            if name in _VARYING or name in CONSTANTS or name in free or is_visual(name):
                 continue
-            template = np.asarray(self._template(name)).astype(array.dtype)
-            given = array[ids]
-            # NaN is no other value than NaN
-            differs = ((given != template) & ~(np.isnan(given) & np.isnan(template))).reshape(len(ids), -1).any(axis=1)
+            differs = self.differs(name, ids)
             if differs.any():
                 sim = ids[int(differs.argmax())]
                 raise ArgumentError(

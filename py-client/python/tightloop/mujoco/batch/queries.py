@@ -18,6 +18,17 @@ from tightloop.sim.rays import RayHits, Rays, check_lengths, points
 
 Array = NDArray[Any]
 
+#: Fields of the model that say where geoms are and what rays meet; each simulation may have its own.
+SEEN = (
+    *("qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mocapid", "body_sameframe"),
+    *("jnt_pos", "jnt_axis", "geom_type", "geom_dataid", "geom_pos", "geom_quat", "geom_size", "geom_sameframe"),
+    *("geom_rgba", "geom_matid", "geom_group", "mat_rgba"),
+)
+#: Those of them that place bodies and geoms, and change no geom.
+_PLACING = (
+    *("qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mocapid", "body_sameframe"),
+    *("jnt_pos", "jnt_axis", "geom_pos", "geom_quat", "geom_sameframe"),
+)
 _REAL = (np.dtype(np.float64), np.dtype(np.float32))
 
 
@@ -29,7 +40,7 @@ class Queries:
         layout: Its state.
         scene: The scene with the model alone.
         threads: Largest number of threads.
-        expansions: Fields with a value per simulation, of which ``qpos0`` places bodies.
+        expansions: Fields with a value per simulation, some of which place bodies and geoms.
     """
 
     def __init__(self, model: Any, layout: StateLayout, scene: Scene, threads: int, *, expansions: Expansions) -> None:
@@ -82,7 +93,7 @@ class Queries:
             is_body = (exclude >= 0) & (exclude < self._model.nbody)
             excluded[is_body] = exclude[is_body]
         origins, directions = pnt[ids], vec[ids]
-        if self._rays.is_complete:
+        if self._rays.is_complete and not self._shapes_vary(ids):
             cast = partial(self._rays.cast, self._poses(rows, ids), threads=self._threads)
         else:
             cast = partial(self._by_mujoco, rows, ids)
@@ -90,6 +101,11 @@ class Queries:
         for array, values in zip(filled, found, strict=True):
             if array is not None:
                 array[ids] = values
+
+    def _shapes_vary(self, ids: Array) -> bool:
+        """Whether geoms of these simulations are other geoms than the model's, and not only elsewhere."""
+        names = [name for name in self._expansions.names if name in SEEN and name not in _PLACING]
+        return any(self._expansions.differs(name, ids).any() for name in names)
 
     def _poses(self, rows: Array, ids: Array) -> list[Array]:
         """``geom_xpos`` and ``geom_xmat`` of rows."""
@@ -111,7 +127,7 @@ class Queries:
         flg_static: bool,
         bodyexclude: Array,
     ) -> RayHits:
-        """What rays meet where a geom is an SDF."""
+        """What rays meet where a geom is an SDF, or geoms of simulations differ."""
         origins, directions = points("pnt", pnt).astype(np.float64), points("vec", vec).astype(np.float64)
         check_lengths(directions)
         shape = pnt.shape[:2]
@@ -154,8 +170,9 @@ class Queries:
                 jacr[sim] = angular
 
     def _place(self, row: Array, sim: int) -> None:
-        if "qpos0" in self._expansions.names:
-            self._model.qpos0[:] = self._expansions.of("qpos0")[sim]
+        for name in self._expansions.names:
+            if name in SEEN:
+                getattr(self._model, name)[:] = self._expansions.of(name)[sim]
         self._layout.load(self._data, row)
         mujoco.mj_kinematics(self._model, self._data)
 

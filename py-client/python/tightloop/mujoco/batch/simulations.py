@@ -20,7 +20,7 @@ from tightloop.mujoco.batch.expansions import Expansions
 from tightloop.mujoco.batch.fields import Fields
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
-from tightloop.mujoco.batch.queries import Queries
+from tightloop.mujoco.batch.queries import SEEN, Queries
 from tightloop.mujoco.batch.selection import Selection
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
 from tightloop.mujoco.batch.stepping import Stepping
@@ -28,9 +28,6 @@ from tightloop.mujoco.batch.views import NamedViews
 from tightloop.sim.sim import Sim
 
 Array = NDArray[Any]
-
-#: Fields for pictures that decide what rays meet.
-_SEEN_BY_RAYS = ("geom_rgba", "geom_matid", "geom_group", "mat_rgba")
 
 
 @checked_calls
@@ -279,8 +276,8 @@ class Batch(NamedViews):
     ) -> None:
         """Intersect rays with the geoms of each simulation, as ``mj_ray`` does. No simulation and no field changes.
 
-        MuJoCo places the geoms of each simulation on one thread; the rays of all run on `num_threads`. In a model with
-        visible SDFs, MuJoCo computes the rays one by one.
+        MuJoCo places the geoms of each simulation on one thread; the rays of all run on `num_threads`. Where geoms are
+        SDFs, or expanded fields make them other geoms than the model's, MuJoCo computes the rays one by one.
 
         Args:
             pnt: Origins in the world [m], ``(num_sims, nray, 3)``, float64 or float32 as all real arrays here.
@@ -295,11 +292,11 @@ class Batch(NamedViews):
 
         Raises:
             ArgumentError: A shape or dtype is wrong, a value is not finite, a direction has length 0, or a simulation
-                has geoms that differ from the model's.
+                differs from the model in what neither places nor shapes geoms.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
-            self._expansions.check_fixed(chosen.indices, also=_SEEN_BY_RAYS)
+            self._expansions.check_fixed(chosen.indices, SEEN)
             rows = self._bindings.pending(chosen.ids)
             filled, options = (dist, geomid, normal), (geomgroup, flg_static, bodyexclude)
             self._queries.rays(rows, chosen.indices, self.num_sims, given=(pnt, vec), filled=filled, options=options)
@@ -317,11 +314,11 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
-            ArgumentError: A shape or dtype is wrong.
+            ArgumentError: A shape or dtype is wrong, or a simulation differs from the model in what places no bodies.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
-            self._expansions.check_fixed(chosen.indices)
+            self._expansions.check_fixed(chosen.indices, SEEN)
             rows = self._bindings.pending(chosen.ids)
             self._queries.jac(rows, chosen.indices, self.num_sims, (jacp, jacr), (point, body))
 

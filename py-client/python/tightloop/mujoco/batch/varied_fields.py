@@ -74,13 +74,8 @@ def _forceranges(model: Any, ranges: Array, shapes: list[int]) -> Values:
     return {"actuator_forcerange": bounds}
 
 
-def _gravcomp_params(model: Any) -> tuple[str, ...]:
-    """Return nothing where no body of the model is compensated: MuJoCo then skips all of it."""
-    return ("body_gravcomp",) if (np.asarray(model.body_gravcomp) > 0.0).any() else ()
-
-
 def _gravcomp(model: Any, shares: Array, shapes: list[int]) -> Values:
-    return {name: shares.astype(np.float64) for name in _gravcomp_params(model)}
+    return {"body_gravcomp": shares.astype(np.float64)}
 
 
 def _frictions(model: Any) -> tuple[str, ...]:
@@ -131,7 +126,7 @@ FIELDS = {
         "of a ball joint cannot differ from the model's; write those of hinges and slides only",
     ),
     "actuator_forcerange": Field(lambda model: ("actuator_forcerange",), _forceranges),
-    "body_gravcomp": Field(_gravcomp_params, _gravcomp),
+    "body_gravcomp": Field(lambda model: ("body_gravcomp",), _gravcomp),
     "geom_friction": Field(_frictions, _friction),
     "geom_solref": Field(lambda model: ("shape_solref",), _solref),
     "geom_solimp": Field(
