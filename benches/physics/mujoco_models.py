@@ -328,7 +328,7 @@ def main() -> None:
         peer.close()
     if not rows:
         raise SystemExit("no model was measured")
-    (device,) = {row.pop("device") for row in rows}
+    device = "; ".join(sorted({row.pop("device") for row in rows}))
     print(
         f"mjbatch {peer.versions['mjbatch']} on MuJoCo {peer.versions['mujoco']}; tightloop {tl.__version__}: {device}"
     )

@@ -7,6 +7,7 @@ Needs MuJoCo and NumPy only, because the process of mjbatch has its own MuJoCo a
   ellipsoid, has no contacts, since tightloop refuses those.
 - mjlab's Go1 and G1: the files and constants of its wheel, with actuators, collisions and options of its velocity tasks
   on flat ground. The Go1 has mjlab's ``FEET_ONLY_COLLISION``, the G1 collides with itself.
+- Hands and muscles: benches/physics/mujoco_hands.py says what they are.
 - Legged robots in a heap: benches/physics/mujoco_heaps.py says what they are.
 - Menagerie's Panda, and the G1 of MuJoCo-Warp's benchmarks, are in no wheel: they come from the reference folder.
 """
@@ -21,6 +22,7 @@ import mujoco
 import numpy as np
 from mjlab_robots import feet_go1, full_g1
 from mujoco_files import MENAGERIE, Robot, found
+from mujoco_hands import HANDS
 from mujoco_heaps import HEAPS
 
 # Parts of dm_control's quadruped.xml that `make_model` of its suite takes out for the tasks `walk` and `run`
@@ -64,6 +66,7 @@ ROBOTS = {
         Robot("Menagerie Panda", _reference("menagerie_panda/scene.xml"), 8, "home", 0.5),
         Robot("MuJoCo-Warp humanoid", _wheel("mujoco-warp/mujoco_warp/test_data/humanoid/humanoid.xml"), 4),
         Robot("MuJoCo-Warp G1, flat", _reference("mjwarp/unitree_g1/scene_flat.xml"), 4, "home", 0.2),
+        *HANDS,
         *HEAPS,
     )
 }

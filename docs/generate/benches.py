@@ -123,6 +123,8 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
 - gymnasium's models use RK4, with four evaluations per step. Its Humanoid asks for PGS with 50 iterations. MuJoCo runs
   that. tightloop solves the same problem with Newton's method.
 - The torso of dm_control's quadruped is an ellipsoid. Its contacts are off on all sides, since tightloop refuses them.
+- The Shadow hand asks for one iteration of the solver. So the solver has not converged, on any side.
+- tightloop keeps up to four points per pair of meshes, and so has more contacts in the rows of the Shadow hand.
 - No side evaluates sensors. In the row `mjlab Go1, feet only`, no other part collides.
 - In rows with `heap`, all parts of a robot collide. It falls, lies on the ground and moves about under small random
   controls. `pyramidal` has an `impratio` of 1. `elliptic 1000` has elliptic cones and an `impratio` of 1000.

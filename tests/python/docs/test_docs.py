@@ -213,7 +213,8 @@ def test_the_readme_claims_no_more_than_was_measured():
 
 def test_the_readme_says_what_robots_on_the_ground_gain():
     rows = performance.read(performance.RESULTS / "amd-epyc-2-cores/mujoco_models.csv").rows
-    ratios = [float(row["median_ratio"]) for row in rows]
+    # hands and arms stand on no ground
+    ratios = [float(row["median_ratio"]) for row in rows if not re.search("hand|arm26", row["model"])]
     (rate,) = [
         float(row["tightloop_steps_per_s"])
         for row in rows
