@@ -31,6 +31,7 @@ with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     import torch.distributed as dist
     from learning.agent import Agent, Normalizer
+    from learning.optimizer import Optimizer
     from learning.rollout import Rollout
     from policy_file import export
     from torch import Tensor, nn
@@ -82,7 +83,7 @@ class Trainer:
         torch.manual_seed(seed)  # all ranks begin with the same weights
         self.agent = Agent(inputs, actions, inputs, config.hidden, config.std)
         self.loss = DistributedDataParallel(Loss(self.agent, config))
-        self.optimizer = torch.optim.Adam(self.agent.parameters(), lr=config.lr, eps=1e-5)
+        self.optimizer = Optimizer(self.agent, config.lr, muon=config.muon)
         self.rollout = Rollout(self.config, inputs, actions, None, torch.device("cpu"))
         self.noise = torch.Generator().manual_seed(seed * rank.size + rank.rank)  # each rank acts on its own
         self.seen = torch.from_numpy(self.envs.reset(seed=seed << 40)[0]).float()
@@ -127,20 +128,13 @@ class Trainer:
                 loss.backward()
                 nn.utils.clip_grad_norm_(self.agent.parameters(), config.grad_max)
                 dist.all_reduce(change)
-                self._follow(change.item() / dist.get_world_size())
+                # the same on all ranks
+                self.optimizer.follow(change.item() / dist.get_world_size(), self.config.kl)
                 self.optimizer.step()
         seen = of_all_ranks(obs)
         normalizers: tuple[Normalizer, ...] = (self.agent.normalizer, self.agent.critic_normalizer)
         for normalizer in normalizers:
             normalizer.see(seen)
-
-    def _follow(self, change: float) -> None:
-        """Let the learning rate follow how much the policy changes, the same on all ranks."""
-        group = self.optimizer.param_groups[0]
-        if change > 2.0 * self.config.kl:
-            group["lr"] = max(1e-5, group["lr"] / 1.2)
-        elif 0.0 < change < 0.5 * self.config.kl:
-            group["lr"] = min(3e-3, group["lr"] * 1.2)
 
     @torch.no_grad()
     def act(self, obs: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -2,7 +2,7 @@
 
 - The Shadow hand of mujoco-mjx, as its scene has it: a ball of 3 cm falls into its palm. In the other row it is a
   cube of 5 cm.
-- The arm26 of mujoco-mjx: two joints, six muscles, whose tendons bend around three cylinders and a sphere.
+- The arm26 of mujoco-mjx: two joints, six muscles, whose tendons bend around two cylinders.
 - The same arm eight times in one world, for a model with as many muscles as a leg of the myo family.
 """
 

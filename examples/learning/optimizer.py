@@ -1,4 +1,4 @@
-"""The optimizer of `ppo.py`: Adam, or Muon for the weights of hidden layers and Adam for the others."""
+"""Optimizer of `ppo.py` and `train_ddp.py`: Adam, or Muon for the weights of hidden layers and Adam for the rest."""
 
 from __future__ import annotations
 
