@@ -1,5 +1,5 @@
 #!/bin/sh
-# Puts what a machine with a GPU and no network needs into a folder below 40 MB: card.sh says how to use it.
+# Puts what a machine with a GPU and no network needs into a folder below 60 MB: card.sh says how to use it.
 #
 #   benches/gpu/card_folder.sh FOLDER [WHEEL...]
 #
@@ -8,7 +8,7 @@ set -eu
 folder=$1
 shift
 cd "$(dirname "$0")/../.."
-most=40 # [MB]
+most=60 # [MB]
 rm -rf "$folder"
 mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/physics" "$folder/examples" "$folder/tests/python/mujoco"
 strip -o "$folder/gpu_bench" "${CARGO_TARGET_DIR:-target}/release/examples/gpu_bench"

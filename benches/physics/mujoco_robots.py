@@ -3,8 +3,7 @@
 Needs MuJoCo and NumPy only, because the process of mjbatch has its own MuJoCo and reads the models here too.
 
 - gymnasium's Ant and Humanoid (v5), and MuJoCo-Warp's humanoid: the XML files of their wheels.
-- dm_control's quadruped: the file of its wheel, without what its tasks `walk` and `run` take out. Its torso, an
-  ellipsoid, has no contacts, since tightloop refuses those.
+- dm_control's quadruped: the file of its wheel, without what its tasks `walk` and `run` take out.
 - mjlab's Go1 and G1: the files and constants of its wheel, with actuators, collisions and options of its velocity tasks
   on flat ground. The Go1 has mjlab's ``FEET_ONLY_COLLISION``, the G1 collides with itself.
 - Hands and muscles: benches/physics/mujoco_hands.py says what they are.
@@ -50,8 +49,6 @@ def _quadruped(_: Path) -> mujoco.MjModel:
     spec.delete(spec.body("ball"))
     spec.delete(spec.site("target"))
     spec.geom("floor").size = (QUADRUPED_FLOOR, QUADRUPED_FLOOR, 0.5)
-    # tightloop refuses contacts of ellipsoids
-    spec.geom("torso").contype = spec.geom("torso").conaffinity = 0
     return spec.compile()
 
 
@@ -60,7 +57,7 @@ ROBOTS = {
     for robot in (
         Robot("gymnasium Ant", _wheel("gymnasium/gymnasium/envs/mujoco/assets/ant.xml"), 5),
         Robot("gymnasium Humanoid", _wheel("gymnasium/gymnasium/envs/mujoco/assets/humanoid.xml"), 5),
-        Robot("dm_control quadruped, torso without contacts", _quadruped, 4),
+        Robot("dm_control quadruped", _quadruped, 4),
         Robot("mjlab Go1, feet only", lambda _: feet_go1().compile(), 4, "start", 0.2),
         Robot("mjlab G1", lambda _: full_g1().compile(), 4, "start", 0.2),
         Robot("Menagerie Panda", _reference("menagerie_panda/scene.xml"), 8, "home", 0.5),

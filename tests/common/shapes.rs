@@ -16,6 +16,7 @@ pub fn shapes(cone: Cone) -> Description {
         [0.0, 0.15, 0.1],
         [0.0, -0.15, 0.1],
         [0.0, 0.0, 0.25],
+        [-0.11, -0.11, 0.1],
     ];
     for (shape, place) in every_kind(0.06).into_iter().zip(around) {
         scene.add_shape("", shape, Pose::at(place));
@@ -30,6 +31,8 @@ pub fn shapes(cone: Cone) -> Description {
         [0.0, 0.06, 0.0],
         [0.0, -0.06, 0.0],
         [0.0, 0.0, 0.06],
+        // between the others, and away from the smaller body
+        [-0.045, -0.045, 0.0],
     ];
     for (k, (shape, place)) in every_kind(0.03).into_iter().zip(places).enumerate() {
         let surface = Surface {
@@ -47,7 +50,9 @@ pub fn shapes(cone: Cone) -> Description {
             surface,
             ..Collision::new(None, shape, pose)
         };
-        body.shapes.push((shape, 1000.0));
+        // the ellipsoid touches, and weighs nothing
+        let density = if k == 5 { 0.0 } else { 1000.0 };
+        body.shapes.push((shape, density));
     }
     scene.add_body(body).unwrap();
     let mut small = Body::new("small", Pose::at([0.05, 0.05, 0.1]));
@@ -78,6 +83,7 @@ pub fn on_a_field() -> Description {
         [0.0, 0.06, 0.0],
         [0.0, -0.06, 0.0],
         [0.0, 0.0, 0.06],
+        [0.0, 0.0, -0.06],
     ];
     for (shape, place) in every_kind(0.03).into_iter().zip(places) {
         let shape = Collision::new(None, shape, Pose::at(place));
@@ -96,7 +102,7 @@ pub fn on_a_field() -> Description {
 }
 
 /// One shape of every kind but the plane, about as large as a ball of this radius [m].
-pub fn every_kind(size: f64) -> [Shape; 5] {
+pub fn every_kind(size: f64) -> [Shape; 6] {
     let [x, y, z] = [0.9 * size, 0.7 * size, 1.1 * size];
     let corners = [
         [x, 0.0, 0.0],
@@ -121,6 +127,7 @@ pub fn every_kind(size: f64) -> [Shape; 5] {
             half_height: 0.9 * size,
         },
         stone(&corners),
+        Shape::Ellipsoid { radii: [x, y, z] },
     ]
 }
 

@@ -122,6 +122,7 @@ fn shape(name: &str, pose: &Pose, shape: &Shape) -> Value {
             radius,
             half_height,
         } => ("capsule", json!([radius, half_height])),
+        Shape::Ellipsoid { radii } => ("ellipsoid", json!(radii)),
         Shape::Mesh(mesh) => {
             let hulls = mesh.hulls.iter().map(|hull| &hull.vertices);
             ("mesh", json!(hulls.collect::<Vec<_>>()))

@@ -26,7 +26,7 @@ impl SceneFile {
     /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`,
     /// `robot` (`null` for what the scene has itself), `body` (`robot/link` as in the model's list; `null` is the world, and
     /// the world of a MuJoCo model), `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`,
-    /// `cylinder`, `capsule`, `mesh`, `hfield`; of visuals also `ellipsoid` and `nothing`) and `mesh` (a place in the list
+    /// `cylinder`, `capsule`, `ellipsoid`, `mesh`, `hfield`; of visuals also `nothing`) and `mesh` (a place in the list
     /// of surfaces; `null` of a plane and of a visual's file). A height field has `squares`, the lengths of its squares
     /// along x and y. A visual that is a plane has `half_extents`, `null` where it has no end. Collisions also have `added`
     /// (whether it is the scene's and not its robot file's) and `whole` (the surface of a mesh before it became hulls, else

@@ -25,6 +25,9 @@ pub struct ShapeTable {
     /// Half of each edge of a box [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_extents: Option<[Number; 3]>,
+    /// Radii of an ellipsoid along its axes [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radii: Option<[Number; 3]>,
     /// Radius of a sphere, cylinder or capsule [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<Number>,
@@ -102,6 +105,8 @@ pub enum ShapeName {
     Cylinder,
     /// A capsule along its z.
     Capsule,
+    /// An ellipsoid.
+    Ellipsoid,
     /// Triangles of a file, of which the convex hull touches.
     Mesh,
     /// What lies below a grid of elevations.
@@ -179,11 +184,13 @@ impl ShapeTable {
             ShapeName::Sphere => ("sphere", &["radius"]),
             ShapeName::Cylinder => ("cylinder", &["radius", "half_height"]),
             ShapeName::Capsule => ("capsule", &["radius", "half_height"]),
+            ShapeName::Ellipsoid => ("ellipsoid", &["radii"]),
             ShapeName::Mesh => ("mesh", &["path"]),
             ShapeName::Hfield => ("hfield", &["path", "size"]),
         };
         let given = [
             ("half_extents", self.half_extents.is_some()),
+            ("radii", self.radii.is_some()),
             ("radius", self.radius.is_some()),
             ("half_height", self.half_height.is_some()),
             ("path", self.path.is_some()),
@@ -234,6 +241,9 @@ impl ShapeTable {
             ShapeName::Capsule => Shape::Capsule {
                 radius,
                 half_height,
+            },
+            ShapeName::Ellipsoid => Shape::Ellipsoid {
+                radii: self.radii.unwrap_or_default().map(|radius| radius.0),
             },
             ShapeName::Mesh => {
                 let path = path();

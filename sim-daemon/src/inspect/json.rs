@@ -87,6 +87,7 @@ fn collision(collision: &Collision) -> Value {
             radius,
             half_height,
         } => json!({ "radius": radius, "half_height": half_height }),
+        Shape::Ellipsoid { radii } => json!({ "radii": radii }),
         Shape::Mesh(mesh) => mesh_properties(mesh),
         Shape::HeightField(field) => json!({
             "samples": [field.rows, field.columns],

@@ -202,6 +202,7 @@ fn shape(properties: &Properties, collision: &Collision) -> String {
             short(*radius),
             short(2.0 * half_height)
         ),
+        Shape::Ellipsoid { radii } => format!("ellipsoid of radii {}", edges(*radii)),
         Shape::HeightField(field) => {
             let [low, high] = field.range();
             let [x, y] = field.half.map(|half| short(2.0 * half));

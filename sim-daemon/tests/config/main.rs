@@ -181,6 +181,12 @@ fn shapes_take_the_sizes_of_their_type() {
             },
         ),
         (
+            "type = \"ellipsoid\"\nradii = [1, 2, 3]",
+            Shape::Ellipsoid {
+                radii: [1.0, 2.0, 3.0],
+            },
+        ),
+        (
             "type = \"capsule\"\nradius = 2\nhalf_height = 1",
             Shape::Capsule {
                 radius: 2.0,

@@ -64,6 +64,7 @@ CALLS: dict[str, Call] = {
     "Scene.add_cylinder": of_scene(
         "add_cylinder", SHAPE | {"radius": "positive", "half_height": "positive"}, radius=1.0, half_height=1.0
     ),
+    "Scene.add_ellipsoid": of_scene("add_ellipsoid", SHAPE | {"radii": "positive triple"}, radii=(1, 1, 1)),
     "Scene.add_capsule": of_scene(
         "add_capsule", SHAPE | {"radius": "positive", "half_height": "positive"}, radius=1.0, half_height=1.0
     ),
@@ -125,11 +126,19 @@ CALLS: dict[str, Call] = {
     "Scene.from_toml": of_scene("from_toml", {"text": "toml", "folder": "text"}, text="dt = 0.001\nsubsteps = 1"),
     "Scene.from_mujoco": of_scene(
         "from_mujoco",
-        {"model": "model", "name": "name", "substeps": "count", "mesh_max_hull_vertices": "count"},
+        {
+            "model": "model",
+            "name": "name",
+            "substeps": "count",
+            "mesh_max_hull_vertices": "count",
+            "without": "names",
+        },
         model=BALL,
     ),
     "Scene.add_mujoco": of_scene(
-        "add_mujoco", POSE | {"model": "model", "name": "name", "mesh_max_hull_vertices": "count"}, model=BALL
+        "add_mujoco",
+        POSE | {"model": "model", "name": "name", "mesh_max_hull_vertices": "count", "without": "names"},
+        model=BALL,
     ),
     "Robot.order": Call(lambda world: world.scene().robots["arm"].order, {"names": "order"}),
     "JointOrder.read": Call(lambda world: world.order.read, {"values": "ordered"}),

@@ -94,7 +94,7 @@ def test_json_has_the_same_facts(tmp_path):
 
 
 def test_everything_that_is_refused_is_named(tmp_path):
-    legs = "".join(f'<geom name="egg{k}" type="ellipsoid" size=".1 .2 .3"/>' for k in range(9))
+    legs = "".join(f'<geom name="egg{k}" size=".1" condim="1" solimp=".9 .95 .001 .5 99"/>' for k in range(9))
     path = file_of(tmp_path, ADHESION.replace('<site name="top"/>', f'<site name="top"/>{legs}'))
     done = inspected(tmp_path, path)
     assert done.returncode == 1

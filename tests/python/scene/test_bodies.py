@@ -30,6 +30,7 @@ def test_a_mass_alone_is_a_ball_of_water():
     [
         ("box", {"half_extents": (0.1, 0.2, 0.3)}, 0.048, [(0.4**2 + 0.6**2) / 12, (0.2**2 + 0.6**2) / 12, 0.2 / 12]),
         ("sphere", {"radius": 0.1}, 4e-3 / 3 * np.pi, [0.004] * 3),
+        ("ellipsoid", {"radii": (0.1, 0.2, 0.3)}, 8e-3 * np.pi, [0.13 / 5, 0.1 / 5, 0.05 / 5]),
         ("cylinder", {"radius": 0.1, "half_height": 0.3}, 6e-3 * np.pi, [0.01 / 4 + 0.36 / 12] * 2 + [0.005]),
     ],
 )

@@ -61,7 +61,7 @@ SYNONYMS = {
     "rot": ("quat",),
     "rotation": ("quat",),
     "rpy": ("quat",),
-    "size": ("half_extents", "radius"),
+    "size": ("half_extents", "radius", "radii"),
     "state": ("forward", "snapshot"),
     "stiffness": ("joint_target_ke",),
     "target": ("joint_target_q",),

@@ -94,6 +94,7 @@ _HINTS = {
     "add_box": dict.fromkeys(("size", "extents", "dimensions"), _HALVES),
     "add_capsule": dict.fromkeys(("length", "height"), _HALF),
     "add_cylinder": dict.fromkeys(("length", "height"), "`half_height` is half its length"),
+    "add_ellipsoid": dict.fromkeys(("radius", "size", "half_extents"), "`radii` are its half lengths along its axes"),
     "add_ground": dict.fromkeys(("pos", "height"), "`z` is its height"),
     "launch": {
         "dt": _OF_SCENE,

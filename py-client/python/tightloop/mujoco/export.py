@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from tightloop.files import cache as cache_files
 from tightloop.files import named as named_files
 from tightloop.files.kinds import instead, kind_of_file
 from tightloop.mujoco import shared_frames, textures
+from tightloop.mujoco.texts import as_bytes
+from tightloop.mujoco.without import leave_out
 from tightloop.optional_imports import optional_import
 from tightloop.whole_files import whole_file
 
@@ -210,14 +213,21 @@ def export(model: Any, path: str | os.PathLike[str]) -> None:
         part.write_bytes(found)
 
 
-def cached(model: Any) -> Path:
+def cached(model: Any, without: Sequence[str] = ()) -> Path:
     """Write an ``MjModel`` to a file in the user's cache, named by its content, and return the file.
+
+    Args:
+        model: A path to XML, an ``mujoco.MjSpec`` or an ``mujoco.MjModel``.
+        without: Names of elements and options to leave out; see `tightloop.mujoco.without`.
 
     Raises:
         SceneError: MuJoCo cannot compile the model, or the file cannot be written.
         MissingLibrary: The package ``mujoco`` is not installed.
     """
-    return kept(arrays(compiled(model)))
+    found = arrays(compiled(model))
+    if without:
+        leave_out(found, without)
+    return kept(found)
 
 
 def kept(found: dict[str, NDArray[Any]]) -> Path:
@@ -254,16 +264,6 @@ def _plain(array: Any) -> NDArray[Any]:
     """A copy of an array as float64 or int32."""
     array = np.asarray(array)
     return np.array(array, dtype=np.float64 if array.dtype.kind == "f" else np.int32, order="C")
-
-
-def as_bytes(given: list[str]) -> NDArray[np.uint8]:
-    """Return texts as bytes, each with a 0 at its end."""
-    return np.frombuffer(b"".join(text.encode() + b"\0" for text in given), np.uint8)
-
-
-def texts(given: NDArray[np.uint8]) -> list[str]:
-    """Return texts of which `as_bytes` made bytes."""
-    return [text.decode() for text in given.tobytes().split(b"\0")[:-1]]
 
 
 def _flags(kind: Any, value: int) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.mujoco import export
+from tightloop.mujoco.texts import as_bytes, texts
 from tightloop.optional_imports import optional_import
 
 #: Kinds of joints with one dof.
@@ -21,7 +22,7 @@ _TEMPLATE = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body>
 def joints_of(file: Path) -> dict[int, int]:
     """Return the hinges and slides of an exported model: index of the joint, by that of its dof."""
     found = _read(file)
-    kinds = export.texts(found["jnt_type.names"])
+    kinds = texts(found["jnt_type.names"])
     single = [kinds[kind] in _SINGLE for kind in found["jnt_type"]]
     return {int(dof): joint for joint, dof in enumerate(found["jnt_dofadr"]) if single[joint]}
 
@@ -29,7 +30,7 @@ def joints_of(file: Path) -> dict[int, int]:
 def driven_joints(file: Path) -> set[int]:
     """Return the joints that an actuator of an exported model drives."""
     found = _read(file)
-    kinds = export.texts(found["actuator_trntype.names"])
+    kinds = texts(found["actuator_trntype.names"])
     pairs = zip(found["actuator_trntype"], found["actuator_trnid"].reshape(-1, 2), strict=True)
     return {int(ends[0]) for kind, ends in pairs if kinds[kind] in ("mjTRN_JOINT", "mjTRN_JOINTINPARENT")}
 
@@ -68,9 +69,9 @@ def added(file: Path, joints: Mapping[int, str], stiffness: float, damping: floa
     for name in [name for name in found if name.startswith("actuator_") and not name.endswith(".names")]:
         own = found[name]
         if f"{name}.names" in found:
-            kinds, kind = export.texts(found[f"{name}.names"]), export.texts(rows[f"{name}.names"])[rows[name][0]]
+            kinds, kind = texts(found[f"{name}.names"]), texts(rows[f"{name}.names"])[rows[name][0]]
             kinds += [kind] * (kind not in kinds)
-            found[f"{name}.names"] = export.as_bytes(kinds)
+            found[f"{name}.names"] = as_bytes(kinds)
             more: NDArray[Any] = np.full(new, kinds.index(kind))
         elif name in own_rows:
             more = own_rows[name]
@@ -78,7 +79,7 @@ def added(file: Path, joints: Mapping[int, str], stiffness: float, damping: floa
             row = rows[name] if name in rows else np.zeros((1, *own.shape[1:]))
             more = np.repeat(row, new, axis=0)
         found[name] = np.concatenate([own, more.astype(own.dtype)]).reshape(old + new, *own.shape[1:])
-    found["names.actuator"] = np.concatenate([found["names.actuator"], export.as_bytes([*joints.values()])])
+    found["names.actuator"] = np.concatenate([found["names.actuator"], as_bytes([*joints.values()])])
     positions = found["key_qpos"][:, found["jnt_qposadr"][places]]
     found["key_ctrl"] = np.ascontiguousarray(np.concatenate([found["key_ctrl"], positions], axis=1))
     return export.kept(found)

@@ -6,7 +6,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from tightloop.checks.arguments import Vector
 from tightloop.errors import SceneError
 from tightloop.mujoco import export
 from tightloop.mujoco.model import MujocoModel
+from tightloop.mujoco.without import checked
 from tightloop.scene.shapes import ORIGIN, UPRIGHT
 from tightloop.whole_files import whole_file
 
@@ -37,15 +38,17 @@ def read_model(
     pos: Vector = ORIGIN,
     quat: Vector = UPRIGHT,
     mesh_max_hull_vertices: int = HULL_VERTICES,
+    without: Sequence[str] = (),
 ) -> MujocoModel:
     """Export a model and read it back, which checks it."""
     vertices = checks.integer("mesh_max_hull_vertices", mesh_max_hull_vertices)
     pos, quat = checks.triple("add_mujoco: pos", pos), checks.quaternion("add_mujoco: quat", quat)
+    left_out = checked(without)
     compiled = export.compiled(model)
     own = compiled.names[: compiled.names.index(b"\0")].decode() or "model"
     own = re.sub(r"[^A-Za-z0-9_.\-]", "_", own)
     name = checks.name("MuJoCo model", own if name is None else name, taken)
-    return read_file(export.cached(compiled), name, pos=pos, quat=quat, mesh_max_hull_vertices=vertices)
+    return read_file(export.cached(compiled, left_out), name, pos=pos, quat=quat, mesh_max_hull_vertices=vertices)
 
 
 def read_file(file: Path, name: str, *, pos: Vector, quat: Vector, mesh_max_hull_vertices: int) -> MujocoModel:

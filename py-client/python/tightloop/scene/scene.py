@@ -15,7 +15,7 @@ from tightloop import _core, notebook
 from tightloop.checks import advice
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Triple, Vector
-from tightloop.checks.attributes import Attributes, ByName
+from tightloop.checks.attributes import ByName
 from tightloop.checks.running import Running
 from tightloop.checks.signatures import checked_calls
 from tightloop.mujoco.model import MujocoModel
@@ -25,6 +25,7 @@ from tightloop.scene.body import Body
 from tightloop.scene.entity import Entity
 from tightloop.scene.options import Cone, FrictionCombine, Options
 from tightloop.scene.parts import Collidable, FreeNames, collidable_name, part_names, summary
+from tightloop.scene.primitives import Primitives
 from tightloop.scene.randomization import BodyOffsets, Offsets, ParamRanges
 from tightloop.scene.robot import Link, Robot
 from tightloop.scene.sensors import ContactSensor, HeightScan, Site
@@ -40,7 +41,7 @@ Part = TypeVar("Part", bound=Entity)
 
 
 @checked_calls
-class Scene(Attributes):
+class Scene(Primitives):
     """A scene: robots, bodies and shapes, time step and solver options, and what varies between worlds.
 
     In the arrays of a frame, robots come first, then bodies, each in the order in which they were added.
@@ -263,7 +264,13 @@ class Scene(Attributes):
 
     @classmethod
     def from_mujoco(
-        cls, model: Model, *, name: str | None = None, substeps: int = 1, mesh_max_hull_vertices: int = HULL_VERTICES
+        cls,
+        model: Model,
+        *,
+        name: str | None = None,
+        substeps: int = 1,
+        mesh_max_hull_vertices: int = HULL_VERTICES,
+        without: Sequence[str] = (),
     ) -> Scene:
         """Make a scene of a MuJoCo model, with its time step, gravity and solver options.
 
@@ -276,16 +283,19 @@ class Scene(Attributes):
                 out.
             substeps: Physics steps per control frame.
             mesh_max_hull_vertices: Largest number of vertices of the convex hull of a mesh, 8 to 1024.
+            without: Names of elements and options that tightloop does not support, to run the model without them. The
+                model's ``notes`` say what that changes.
 
         Returns:
             The scene; ``scene.models`` has the model.
 
         Raises:
-            SceneError: MuJoCo cannot compile the model, or it has elements that are not supported, by their names.
+            SceneError: MuJoCo cannot compile the model, it has elements that are not supported, by their names, or
+                ``without`` names what it does not have, or what is supported.
             MissingLibrary: The extra ``mujoco`` is not installed.
         """
         substeps = checks.integer("from_mujoco: substeps", substeps)
-        read = read_model(model, name, (), mesh_max_hull_vertices=mesh_max_hull_vertices)
+        read = read_model(model, name, (), mesh_max_hull_vertices=mesh_max_hull_vertices, without=without)
         scene = cls(dt=read.options["dt"], substeps=substeps, gravity=read.options["gravity"])
         scene.solver(**read.options["solver"])
         scene._add(scene.models, read, "add_mujoco")
@@ -299,6 +309,7 @@ class Scene(Attributes):
         pos: Vector = ORIGIN,
         quat: Vector = UPRIGHT,
         mesh_max_hull_vertices: int = HULL_VERTICES,
+        without: Sequence[str] = (),
     ) -> MujocoModel:
         """Add a MuJoCo model, beside robots from URDF and bodies of the scene.
 
@@ -312,6 +323,7 @@ class Scene(Attributes):
             pos: Position of the model's world in the scene [m].
             quat: Orientation of the model's world in the scene (x, y, z, w).
             mesh_max_hull_vertices: Largest number of vertices of the convex hull of a mesh, 8 to 1024.
+            without: As in `from_mujoco`.
 
         Returns:
             The model.
@@ -321,7 +333,13 @@ class Scene(Attributes):
             MissingLibrary: The extra ``mujoco`` is not installed.
         """
         read = read_model(
-            model, name, part_names(self), pos=pos, quat=quat, mesh_max_hull_vertices=mesh_max_hull_vertices
+            model,
+            name,
+            part_names(self),
+            pos=pos,
+            quat=quat,
+            mesh_max_hull_vertices=mesh_max_hull_vertices,
+            without=without,
         )
         check_options(read, asdict(self._options), self.models)
         return self._add(self.models, read, "add_mujoco")
@@ -394,57 +412,6 @@ class Scene(Attributes):
             SceneError: A value is out of range; the message names it.
         """
         return self._add_shape("box", name, body, density, surface, pos=pos, quat=quat, half_extents=half_extents)
-
-    @with_surface
-    def add_sphere(
-        self,
-        *,
-        radius: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | Link | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-        **surface: Unpack[Surface],
-    ) -> Shape:
-        """Add a sphere with a ``radius`` [m]; the other arguments are those of `add_box`."""
-        return self._add_shape("sphere", name, body, density, surface, pos=pos, quat=quat, radius=radius)
-
-    @with_surface
-    def add_cylinder(
-        self,
-        *,
-        radius: float,
-        half_height: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | Link | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-        **surface: Unpack[Surface],
-    ) -> Shape:
-        """Add a cylinder along its z axis, sizes in [m]; the other arguments are those of `add_box`."""
-        return self._add_shape(
-            "cylinder", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
-        )
-
-    @with_surface
-    def add_capsule(
-        self,
-        *,
-        radius: float,
-        half_height: float,
-        pos: Vector = ORIGIN,
-        quat: Vector = UPRIGHT,
-        body: Body | Link | str | None = None,
-        density: float | None = None,
-        name: str | None = None,
-        **surface: Unpack[Surface],
-    ) -> Shape:
-        """Add a capsule along its z axis, sizes in [m]; ``half_height`` is half the distance of the caps' centres."""
-        return self._add_shape(
-            "capsule", name, body, density, surface, pos=pos, quat=quat, radius=radius, half_height=half_height
-        )
 
     @with_surface
     def add_mesh(

@@ -11,7 +11,7 @@ from tightloop.checks.arguments import Quaternion, Triple, Vector
 from tightloop.checks.signatures import with_arguments
 from tightloop.errors import SceneError
 
-ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "mesh", "hfield"]
+ShapeType = Literal["plane", "box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh", "hfield"]
 
 ORIGIN = (0.0, 0.0, 0.0)
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -52,6 +52,7 @@ class Shape:
 
     Attributes:
         body: Name of its body, or ``robot/link``; None for a static shape.
+        radii: Radii of an ellipsoid along its axes [m].
         path: File of a mesh, ``notes`` say how the mesh was changed; or of the elevations of a height field.
         size: Lengths of a height field along x and y [m].
         base: Thickness of a height field below its lowest elevation [m].
@@ -62,6 +63,7 @@ class Shape:
     pos: Triple
     quat: Quaternion
     half_extents: Triple | None = None
+    radii: Triple | None = None
     radius: float | None = None
     half_height: float | None = None
     path: Path | None = None
@@ -105,7 +107,7 @@ def checked(what: str, pos: Vector, quat: Vector, **sizes: Any) -> dict[str, Any
         "quat": checks.quaternion(f"{what}: quat", quat),
     }
     for size, value in sizes.items():
-        if size == "half_extents":
+        if size in ("half_extents", "radii"):
             values[size] = checks.triple(f"{what}: {size}", value)
             checks.number(f"{what}: smallest of {size}", min(values[size]), above=0.0)
         else:

@@ -13,6 +13,8 @@ pub struct Polytope {
     pub radius: f64,
     /// Axis and radius of discs about the points: of a cylinder.
     pub discs: Option<(Vector, f64)>,
+    /// Half axes of an ellipsoid about the point.
+    pub half_axes: Option<[Vector; 3]>,
     /// Directions of edges that faces do not distinguish: of a box or segment.
     pub directions: Vec<Vector>,
 }
@@ -31,6 +33,7 @@ impl Polytope {
             edges: vec![],
             radius: 0.0,
             discs: None,
+            half_axes: None,
             directions: vec![],
         };
         match shape {
@@ -78,9 +81,17 @@ impl Polytope {
                 polytope.points = vec![place([0.0, 0.0, half]), place([0.0, 0.0, -half])];
                 polytope.discs = Some((axes[2], radius));
             }
+            Shape::Ellipsoid(radii) => {
+                polytope.half_axes = Some([0, 1, 2].map(|i| scale(axes[i], radii[i])));
+            }
             Shape::Plane => panic!("a plane has no end"),
         }
         polytope
+    }
+
+    /// Is its surface curved, but for a radius around it?
+    pub fn is_curved(&self) -> bool {
+        self.discs.is_some() || self.half_axes.is_some()
     }
 
     pub fn reach(&self, d: Vector) -> f64 {
@@ -96,7 +107,11 @@ impl Polytope {
             }
             None => 0.0,
         };
-        reach + disc + self.radius
+        let round = match self.half_axes {
+            Some(half) => half.iter().map(|&x| dot(x, d).powi(2)).sum::<f64>().sqrt(),
+            None => 0.0,
+        };
+        reach + disc + round + self.radius
     }
 }
 

@@ -14,6 +14,7 @@ pub fn reach(shape: Shape) -> f64 {
         Shape::Capsule(r, h) => r + h,
         Shape::Cylinder(r, h) => r.hypot(h),
         Shape::Box(half) => dot(half, half).sqrt(),
+        Shape::Ellipsoid(radii) => radii.iter().copied().fold(0.0, f64::max),
         Shape::Hull(_) => unreachable!("hulls have tests of their own"),
     }
 }
@@ -25,6 +26,10 @@ pub fn support(shape: Shape, d: Vector) -> f64 {
         Shape::Capsule(r, h) => r + h * d[2].abs(),
         Shape::Cylinder(r, h) => r * d[0].hypot(d[1]) + h * d[2].abs(),
         Shape::Box(half) => (0..3).map(|i| half[i] * d[i].abs()).sum(),
+        Shape::Ellipsoid(radii) => (0..3)
+            .map(|i| (radii[i] * d[i]).powi(2))
+            .sum::<f64>()
+            .sqrt(),
         other => unreachable!("{other:?}"),
     }
 }

@@ -27,6 +27,9 @@ fn cuboid(random: &mut Random) -> Shape {
 fn cylinder(random: &mut Random) -> Shape {
     Shape::Cylinder(random.between(0.02, 0.1), random.between(0.02, 0.2))
 }
+fn ellipsoid(random: &mut Random) -> Shape {
+    Shape::Ellipsoid([0; 3].map(|_| random.between(0.02, 0.2)))
+}
 fn plane(_: &mut Random) -> Shape {
     Shape::Plane
 }
@@ -38,11 +41,12 @@ const ROUND: [[Kind; 2]; 5] = [
     [capsule, capsule],
     [capsule, cuboid],
 ];
-const ON_PLANE: [[Kind; 2]; 4] = [
+const ON_PLANE: [[Kind; 2]; 5] = [
     [plane, sphere],
     [plane, capsule],
     [plane, cuboid],
     [plane, cylinder],
+    [plane, ellipsoid],
 ];
 
 /// From deep inside each other to well apart.

@@ -105,6 +105,8 @@ pub enum Shape {
     Box(Vector),
     /// Radius and half height.
     Cylinder(f64, f64),
+    /// Radii.
+    Ellipsoid(Vector),
     /// Its number.
     Hull(usize),
 }
@@ -123,6 +125,7 @@ impl Shape {
                 radius,
                 half_height,
             },
+            Shape::Ellipsoid(radii) => sim_model::Shape::Ellipsoid { radii },
             Shape::Hull(number) => sim_model::Shape::Mesh(Arc::new(mesh(&hulls[number]))),
         }
     }

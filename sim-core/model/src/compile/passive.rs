@@ -141,7 +141,7 @@ pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
     let turning = damped.flat_map(|actuator| &actuator.turning);
     let mut driven: Vec<usize> = turning.flat_map(|length| length.dofs.clone()).collect();
     let dampers = m.springs.tendons.iter();
-    let damped = dampers.filter(|tendon| tendon.damping != 0.0);
+    let damped = dampers.filter(|tendon| tendon.damping != 0.0 || tendon.armature != 0.0);
     let spatial = damped.filter_map(|tendon| tendon.length.tendon);
     driven.extend(spatial.flat_map(|tendon| m.tendons[tendon].dofs.clone()));
     let is_solved = |body: &usize| {

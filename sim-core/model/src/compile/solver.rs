@@ -98,7 +98,11 @@ pub(super) fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
                 || !m.free_joints.is_empty()
                 || !m.drags.is_empty()
                 || !m.actuators.damped.is_empty()
-                || tendons.iter().any(|tendon| tendon.damping != 0.0)
+                || tendons.iter().any(|tendon| {
+                    // armature joins the free bodies that a spatial tendon pulls, whose bias is implicit
+                    let is_heavy = tendon.armature != 0.0 && tendon.length.tendon.is_some();
+                    tendon.damping != 0.0 || is_heavy
+                })
         }
     }
 }

@@ -49,6 +49,7 @@ impl Lengths<'_> {
             stiffness: tendon.stiffness,
             rest: tendon.rest,
             damping: tendon.damping,
+            armature: tendon.armature,
         }
     }
 

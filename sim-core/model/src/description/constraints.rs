@@ -70,7 +70,7 @@ pub enum ConstraintLaw {
     },
 }
 
-/// A tendon that acts as a spring and a damper.
+/// A tendon that acts as a spring, a damper and an inertia.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tendon {
     /// Its length.
@@ -81,4 +81,6 @@ pub struct Tendon {
     pub rest: [f64; 2],
     /// [N·s/m or N·m·s/rad]
     pub damping: f64,
+    /// [kg or kg·m²]
+    pub armature: f64,
 }

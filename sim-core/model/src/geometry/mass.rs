@@ -72,6 +72,11 @@ pub fn mass_properties(shape: &Shape, density: f64) -> Result<Inertial, ModelErr
             let across = across + caps * (ball + shift);
             centred(mass + caps, [across, across, along + caps * ball])
         }
+        Shape::Ellipsoid { radii: [x, y, z] } => {
+            let mass = density * 4.0 / 3.0 * PI * x * y * z;
+            let across = |a: &f64, b: &f64| 0.2 * mass * (a * a + b * b);
+            centred(mass, [across(y, z), across(z, x), across(x, y)])
+        }
         Shape::Mesh(mesh) => of_triangles(mesh.solid()?.as_ref(), density),
     })
 }

@@ -30,7 +30,7 @@ pub use mesh::{HULL_NOTE, Mesh, MeshOptions};
 pub use ray_shape::{RAY_SMALL, RayShape};
 pub use shape::Shape;
 pub use stretch::NoHull;
-pub use tessellate::{ellipsoid, triangles};
+pub use tessellate::triangles;
 pub use triangle_tree::TriangleTree;
 pub use trimesh::TriMesh;
 pub use visual::{Color, Image, TRIANGLES_SHOWN_MAX, Texture, VisualMesh};

@@ -36,6 +36,11 @@ pub enum Shape {
         /// Half of the height of the cylinder between the half spheres [m].
         half_height: f64,
     },
+    /// An ellipsoid.
+    Ellipsoid {
+        /// Radii along the axes [m].
+        radii: [f64; 3],
+    },
     /// Triangles of a file.
     Mesh(Arc<Mesh>),
     /// What lies below a grid of elevations. Of static shapes only.
@@ -51,6 +56,7 @@ impl Shape {
             Shape::Sphere { .. } => "sphere",
             Shape::Cylinder { .. } => "cylinder",
             Shape::Capsule { .. } => "capsule",
+            Shape::Ellipsoid { .. } => "ellipsoid",
             Shape::Mesh(_) => "mesh",
             Shape::HeightField(_) => "hfield",
         }

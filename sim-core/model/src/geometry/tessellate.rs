@@ -38,13 +38,13 @@ pub fn triangles(shape: &Shape) -> TriMesh {
             radius,
             half_height,
         } => revolved(&half_circles(radius, half_height)),
+        &Shape::Ellipsoid { radii } => ellipsoid(radii),
         Shape::HeightField(field) => field.surface(),
         Shape::Mesh(mesh) => mesh.triangles.clone(),
     }
 }
 
-/// An ellipsoid about the origin with these radii along the axes. [m]
-pub fn ellipsoid(radii: [f64; 3]) -> TriMesh {
+fn ellipsoid(radii: [f64; 3]) -> TriMesh {
     let mut mesh = revolved(&half_circles(1.0, 0.0));
     for vertex in &mut mesh.vertices {
         *vertex = std::array::from_fn(|axis| radii[axis] * vertex[axis]);

@@ -194,7 +194,8 @@ view! {
     Compensation<f64> as "Compensation":
         Always { "body": body, "link": link, "mass": mass, "share": share, "center": center };
     Tendon<f64> as "Tendon":
-        Always { "terms": length, "stiffness": stiffness, "rest": rest, "damping": damping };
+        Always { "terms": length, "stiffness": stiffness, "rest": rest, "damping": damping }
+        Later { "armature": armature };
     Actuator<f64> as "Actuator":
         Always {
             "terms": terms,

@@ -123,7 +123,8 @@ view! {
 words! {
     Cone: Elliptic "Elliptic", Pyramidal "Pyramidal";
     FrictionCombine: Max "Max", Mean "Mean", Min "Min", Product "Product";
-    Kind: Plane "Plane", Field "Field", Sphere "Sphere", Capsule "Capsule", Box "Box", Cylinder "Cylinder", Hull "Hull";
+    Kind: Plane "Plane", Field "Field", Sphere "Sphere", Capsule "Capsule", Box "Box", Cylinder "Cylinder",
+        Ellipsoid "Ellipsoid", Hull "Hull";
 }
 
 impl View for Table {

@@ -322,13 +322,19 @@ fn add_springs(
     };
     let stiffness = kept("tendon_stiffness", "mjDSBL_SPRING")?;
     let damping = kept("tendon_damping", "mjDSBL_DAMPER")?;
+    let armature = match file.has("tendon_armature") {
+        true => file.reals("tendon_armature", count)?,
+        false => vec![0.0; count],
+    };
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
-    for k in (0..count).filter(|&k| stiffness[k] != 0.0 || damping[k] != 0.0) {
+    let acts = |k: &usize| [stiffness[*k], damping[*k], armature[*k]] != [0.0; 3];
+    for k in (0..count).filter(acts) {
         parts.tendons.push(Tendon {
             length: tendons.length(file, k as i64)?.clone(),
             stiffness: stiffness[k],
             rest: rests[k],
             damping: damping[k],
+            armature: armature[k],
         });
     }
     Ok(())

@@ -97,6 +97,7 @@ pub(super) fn primitive(kind: &str, [a, b, c]: [f64; 3]) -> Option<Shape> {
             radius: a,
             half_height: b,
         },
+        "mjGEOM_ELLIPSOID" => Shape::Ellipsoid { radii: [a, b, c] },
         "mjGEOM_BOX" => Shape::Box {
             half_extents: [a, b, c],
         },

@@ -12,7 +12,7 @@ use super::meshes::Meshes;
 use super::names::names;
 use crate::description::Robot;
 use crate::error::ModelError;
-use crate::geometry::{Shape, TriMesh, ellipsoid};
+use crate::geometry::{Shape, TriMesh};
 use crate::visual::{Look, Visual, Visuals};
 
 /// Groups of geoms that MuJoCo's viewer shows at first: those below.
@@ -145,10 +145,6 @@ impl<'a> Surfaces<'a> {
                     true => half,
                     false => f64::INFINITY,
                 }),
-            },
-            "mjGEOM_ELLIPSOID" => Look::Triangles {
-                kind: "ellipsoid",
-                surface: Arc::new(ellipsoid(size)),
             },
             "mjGEOM_HFIELD" => {
                 let field = height_field(self.file, self.chosen[geom])?;

@@ -98,6 +98,10 @@ fn notes(file: &ModelFile) -> Result<Vec<String>, ModelError> {
         );
     }
     notes.extend(newer_steps(file)?);
+    // what `without` left out of the model
+    if file.has("notes.without") {
+        notes.extend(file.texts("notes.without")?);
+    }
     Ok(notes)
 }
 

@@ -17,7 +17,6 @@ const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("joint", "jnt_springyield", "plastic springs"),
     ("geom", "geom_adhesion", "adhesion"),
     ("geom", "geom_surfacevel", "surface velocity"),
-    ("tendon", "tendon_armature", "armature of a tendon"),
     ("tendon", "tendon_dampingpoly", "damping of a tendon"),
     ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
     ("tendon", "tendon_springyield", "plastic springs"),
@@ -62,7 +61,12 @@ pub(super) fn listed(reasons: &[String]) -> String {
     if reasons.len() > LISTED_MAX {
         text += &format!("; and {} more", reasons.len() - LISTED_MAX);
     }
-    text + "; remove what is named from the model"
+    text += "; remove what is named from the model";
+    // flexes and plugins cannot be left out
+    if reasons.iter().any(|reason| !reason.starts_with("model: ")) {
+        text += ", or give its name in `without` of `from_mujoco`";
+    }
+    text
 }
 
 /// Everything that keeps a model from running, a sentence each.
@@ -178,7 +182,6 @@ fn geoms(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> 
         let name = &names[geom];
         let moves = bodies[geom].is_some_and(|body| welds[body] != 0);
         let shape = match kinds[geom].as_str() {
-            "mjGEOM_ELLIPSOID" => Some("contacts of ellipsoids"),
             "mjGEOM_HFIELD" if moves => Some("height fields on bodies that move"),
             "mjGEOM_SDF" => Some("contacts of signed distance fields"),
             "mjGEOM_PLANE" if moves => Some("planes on bodies that move"),
@@ -228,6 +231,41 @@ fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
         let solimps = file.vectors::<5>(&format!("tendon_solimp_{which}"), count)?;
         for (name, solimp) in names.iter().zip(&solimps) {
             refuse_power(refused, "tendon", name, solimp);
+        }
+    }
+    // MuJoCo counts the first coordinate and the first dof of a joint, which is no length of a ball's turn
+    let wraps = file.rows("wrap_type");
+    let (kinds, objects) = (
+        file.kinds("wrap_type", wraps)?,
+        file.integers("wrap_objid", wraps)?,
+    );
+    let joint_kinds = file.kinds("jnt_type", file.rows("jnt_type"))?;
+    let is_wide = |row: usize| {
+        let joint = usize::try_from(objects[row])
+            .ok()
+            .and_then(|joint| joint_kinds.get(joint));
+        kinds[row] == "mjWRAP_JOINT"
+            && joint.is_some_and(|kind| !matches!(kind.as_str(), "mjJNT_SLIDE" | "mjJNT_HINGE"))
+    };
+    let firsts = file.integers("tendon_adr", count)?;
+    let lengths = file.integers("tendon_num", count)?;
+    let armatures = match file.has("tendon_armature") {
+        true => file.reals("tendon_armature", count)?,
+        false => vec![0.0; count],
+    };
+    for (k, name) in names.iter().enumerate() {
+        let first = firsts[k].max(0);
+        let rows =
+            (first..first.saturating_add(lengths[k]).min(wraps as i64)).map(|row| row as usize);
+        let rows: Vec<usize> = rows.collect();
+        if rows.iter().copied().any(is_wide) {
+            refused.push(no("tendon", name, "joints that are not of one dof"));
+        }
+        // as MuJoCo's compiler refuses it
+        let bends =
+            |&row: &usize| matches!(kinds[row].as_str(), "mjWRAP_SPHERE" | "mjWRAP_CYLINDER");
+        if armatures[k] != 0.0 && rows.iter().any(bends) {
+            refused.push(no("tendon", name, "armature where it bends around a geom"));
         }
     }
     Ok(())

@@ -198,7 +198,13 @@ pub(super) fn spatial_tendons(file: &ModelFile) -> Result<Vec<bool>, ModelError>
 /// Which tendons are measured, or act.
 pub(super) fn used(file: &ModelFile, count: usize) -> Result<Vec<bool>, ModelError> {
     let mut used = vec![false; count];
-    for array in ["tendon_damping", "tendon_stiffness", "tendon_frictionloss"] {
+    let arrays = [
+        "tendon_damping",
+        "tendon_stiffness",
+        "tendon_frictionloss",
+        "tendon_armature",
+    ];
+    for array in arrays.into_iter().filter(|array| file.has(array)) {
         let values = file.reals(array, count)?;
         (used.iter_mut().zip(values)).for_each(|(used, value)| *used |= value != 0.0);
     }

@@ -8,8 +8,8 @@ use crate::geometry::Shape;
 use crate::inertia::{negative_moment, triangle_excess};
 use crate::value_checks::{name, not_negative, unique, within};
 
-/// Most dofs of one robot: a chain of them compiles in half a second.
-const ROBOT_DOFS_MAX: usize = 512;
+/// Most dofs of one robot: a chain of them compiles in ten seconds.
+const ROBOT_DOFS_MAX: usize = 1024;
 /// Largest mass [kg]: ten of the largest ships.
 const MASS_MAX: f64 = 1e10;
 /// Largest entry of an inertia [kg·m²]: a kilometre of them.

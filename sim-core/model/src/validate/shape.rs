@@ -68,6 +68,7 @@ pub(crate) fn shape_sizes(what: &str, shape: &Shape) -> Result<(), ModelError> {
             size(&format!("{what}: radius of the {kind}"), [radius])?;
             size(&format!("{what}: half height of the {kind}"), [half_height])
         }
+        Shape::Ellipsoid { radii } => size(&format!("{what}: radius of the ellipsoid"), radii),
         // checked when it was read
         Shape::Mesh(_) | Shape::HeightField(_) => Ok(()),
     }

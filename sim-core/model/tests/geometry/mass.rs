@@ -50,6 +50,14 @@ fn primitives_have_their_textbook_inertia() {
         &body(ball, [0.4 * ball * r * r; 3]),
         1e-15,
     );
+    let egg = 4.0 / 3.0 * PI * 0.3 * 0.5 * 0.7;
+    assert_alike(
+        &properties(Shape::Ellipsoid {
+            radii: [0.3, 0.5, 0.7],
+        }),
+        &body(egg, [0.74, 0.58, 0.34].map(|squares| egg * squares / 5.0)),
+        1e-14,
+    );
     let rod = PI * r * r * 2.0 * h;
     let across = rod * (3.0 * r * r + (2.0 * h) * (2.0 * h)) / 12.0;
     let cylinder = properties(Shape::Cylinder {
@@ -107,6 +115,9 @@ fn tessellated_primitives_are_closed_and_face_outward() {
         Shape::Capsule {
             radius: 0.5,
             half_height: 2.0,
+        },
+        Shape::Ellipsoid {
+            radii: [0.3, 0.5, 0.7],
         },
     ];
     for shape in shapes {

@@ -144,6 +144,8 @@ arrays! { m;
         ten_moment: TenMoment [Scalar; m.tendons.iter().map(|tendon| tendon.dofs.len()).sum::<usize>()] Stage "m/rad or –";
         // J (ω × (ω × o)) of free bodies, which MuJoCo's acceleration of a length has beside our J q̈
         ten_swing: TenSwing [Scalar; m.tendons.len()] Stage "m/s²";
+        // a J J̇ q̇ of tendons with armature, for each moment
+        ten_bias: TenBias [Scalar; m.tendons.iter().map(|tendon| tendon.dofs.len()).sum::<usize>()] Stage "N·m or N";
         actuator_length: ActuatorLength [Scalar; m.actuators.all.len()] Stage "rad or m"
             => "actuator_length" [Actuators], "Length of each actuator, gear included.";
         actuator_velocity: ActuatorVelocity [Scalar; m.actuators.all.len()] Stage "rad/s or m/s"

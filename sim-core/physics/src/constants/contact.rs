@@ -5,6 +5,7 @@ use super::clip::Cut;
 use super::height_field::FieldTables;
 use super::hull::HullTables;
 use super::pair_groups::Group;
+pub use super::pair_groups::{Kind, PAIR_KINDS};
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
 use crate::math::factor::UpdatePath;
@@ -18,53 +19,6 @@ pub enum Cone {
     /// A pyramid inside it.
     Pyramidal,
 }
-
-/// Kinds of shapes; of a pair, the lower kind is the first. A sphere's size is its radius; a capsule's and a
-/// cylinder's radius and half height; a box's and a hull's half extents (those of the box around it).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
-    /// z ≤ 0.
-    Plane,
-    /// A row of the table of height fields; always static.
-    Field,
-    /// Around its centre.
-    Sphere,
-    /// Along z.
-    Capsule,
-    /// Along its axes.
-    Box,
-    /// Along z.
-    Cylinder,
-    /// A row of the hull table.
-    Hull,
-}
-
-/// Pairs of kinds that can touch, height fields left out, in the order of their stages.
-pub const PAIR_KINDS: [(Kind, Kind); 20] = {
-    use Kind::*;
-    [
-        (Plane, Sphere),
-        (Plane, Capsule),
-        (Plane, Box),
-        (Plane, Cylinder),
-        (Plane, Hull),
-        (Sphere, Sphere),
-        (Sphere, Capsule),
-        (Sphere, Box),
-        (Sphere, Cylinder),
-        (Sphere, Hull),
-        (Capsule, Capsule),
-        (Capsule, Box),
-        (Capsule, Cylinder),
-        (Capsule, Hull),
-        (Box, Box),
-        (Box, Cylinder),
-        (Box, Hull),
-        (Cylinder, Cylinder),
-        (Cylinder, Hull),
-        (Hull, Hull),
-    ]
-};
 
 recast! {
     /// Shapes, the pairs of them that may touch, and the classes of contacts.

@@ -55,7 +55,7 @@ recast! {
 }
 
 recast! {
-    /// A tendon that acts as a spring and a damper.
+    /// A tendon that acts as a spring, a damper and an inertia.
     #[derive(Clone, Debug)]
     pub struct Tendon<R> {
         /// Its length.
@@ -66,5 +66,7 @@ recast! {
         pub rest: [R; 2],
         /// [N·s/m or N·m·s/rad]
         pub damping: R,
+        /// [kg or kg·m²]
+        pub armature: R,
     }
 }

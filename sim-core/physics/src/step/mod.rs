@@ -30,6 +30,7 @@ macro_rules! every_stage {
             bias                 [tree::bias::Bias]                          Both;
             mass_matrix          [tree::mass_matrix::MassMatrix]             Both;
             tendons              [tendons::Tendons]                          Both;
+            tendon_armature      [tendons::armature::Armature]               Both;
             // forces but those of constraints, summed in `smooth_force`
             actuation            [forces::actuation::Actuation]              Both;
             springs              [forces::springs::Springs]                  Both;
@@ -45,26 +46,34 @@ macro_rules! every_stage {
             plane_capsule        [collide::PlaneCapsule]                     Both;
             plane_box            [collide::PlaneBox]                         Both;
             plane_cylinder       [collide::PlaneCylinder]                    Both;
+            plane_ellipsoid      [collide::PlaneEllipsoid]                   Both;
             plane_hull           [collide::PlaneHull]                        Both;
             field_sphere         [collide::FieldSphere]                      Both;
             field_capsule        [collide::FieldCapsule]                     Both;
             field_box            [collide::FieldBox]                         Both;
             field_cylinder       [collide::FieldCylinder]                    Both;
+            field_ellipsoid      [collide::FieldEllipsoid]                   Both;
             field_hull           [collide::FieldHull]                        Both;
             sphere_sphere        [collide::SphereSphere]                     Both;
             sphere_capsule       [collide::SphereCapsule]                    Both;
             sphere_box           [collide::SphereBox]                        Both;
             sphere_cylinder      [collide::SphereCylinder]                   Both;
+            sphere_ellipsoid     [collide::SphereEllipsoid]                  Both;
             sphere_hull          [collide::SphereHull]                       Both;
             capsule_capsule      [collide::CapsuleCapsule]                   Both;
             capsule_box          [collide::CapsuleBox]                       Both;
             capsule_cylinder     [collide::CapsuleCylinder]                  Both;
+            capsule_ellipsoid    [collide::CapsuleEllipsoid]                 Both;
             capsule_hull         [collide::CapsuleHull]                      Both;
             box_box              [collide::BoxBox]                           Both;
             box_cylinder         [collide::BoxCylinder]                      Both;
+            box_ellipsoid        [collide::BoxEllipsoid]                     Both;
             box_hull             [collide::BoxHull]                          Both;
             cylinder_cylinder    [collide::CylinderCylinder]                 Both;
+            cylinder_ellipsoid   [collide::CylinderEllipsoid]                Both;
             cylinder_hull        [collide::CylinderHull]                     Both;
+            ellipsoid_ellipsoid  [collide::EllipsoidEllipsoid]               Both;
+            ellipsoid_hull       [collide::EllipsoidHull]                    Both;
             hull_hull            [collide::HullHull]                         Both;
             contact_rows         [constraints::contact_rows::ContactRows]    Both;
             // accelerations and constraint forces, then the next state

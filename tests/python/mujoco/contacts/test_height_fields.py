@@ -20,7 +20,7 @@ KEPT = 8
 SAME = 1e-6
 #: MuJoCo's own search (nativeccd) is exact to rounding for curved shapes. For boxes and meshes it returns
 #: depths below the least one of all separating axes (10 % of it at times); libccd, the older search, does not.
-NATIVE = ("sphere", "small_sphere", "capsule", "cylinder")
+NATIVE = ("sphere", "small_sphere", "capsule", "cylinder", "ellipsoid")
 HULL = np.random.default_rng(9).normal(0, 0.08, (24, 3))
 GEOMS = {
     "sphere": 'type="sphere" size=".08"',
@@ -28,6 +28,7 @@ GEOMS = {
     "capsule": 'type="capsule" size=".05 .1"',
     "box": 'type="box" size=".1 .07 .05"',
     "cylinder": 'type="cylinder" size=".07 .06"',
+    "ellipsoid": 'type="ellipsoid" size=".1 .07 .05"',
     "mesh": 'type="mesh" mesh="hull"',
 }
 XML = """<mujoco model="m">

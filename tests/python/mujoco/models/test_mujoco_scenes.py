@@ -165,8 +165,9 @@ def test_commands_are_checked(model):
     ("elements", "reasons"),
     [
         (
-            '<worldbody><body><joint/><geom type="ellipsoid" size=".1 .2 .3"/></body></worldbody>',
-            ["geom0", "ellipsoid"],
+            '<worldbody><body><joint type="ball" name="b"/><geom size=".1"/></body></worldbody>'
+            '<tendon><fixed name="t" stiffness="1"><joint joint="b" coef="1"/></fixed></tendon>',
+            ["tendon `t`: no support for joints that are not of one dof"],
         ),
         (
             '<worldbody><body name="b"><joint name="j" range="-9 9"/>'

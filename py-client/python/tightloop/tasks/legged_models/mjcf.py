@@ -18,8 +18,6 @@ from tightloop.tasks.legged_models.skeleton import Hinge, Source
 
 #: Name of the model in its scenes.
 NAME = "robot"
-#: Corners of the hull of an ellipsoid.
-_CORNERS = 64
 #: Keyframes that are tried first.
 _STANDING = ("home", "stand", "standing", "default")
 
@@ -55,7 +53,6 @@ def prepare(model: Any, what: str, dt: float, solver: Solver) -> tuple[Any, Sour
             )
         robot.add_freejoint(name="floating_base")
     robot.pos, robot.quat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    _round_ellipsoids(spec)
     option = spec.option
     option.timestep, option.integrator = dt, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.gravity = (0.0, 0.0, -9.81)
@@ -172,20 +169,6 @@ def _alone(spec: Any, what: str) -> Any:
     for element in [*spec.worldbody.geoms, *(body for body in bodies if body is not robot)]:
         spec.delete(element)
     return robot
-
-
-def _round_ellipsoids(spec: Any) -> None:
-    """Make hulls of ellipsoids, whose contacts tightloop has not."""
-    mujoco: Any = import_module("mujoco")
-
-    angles = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(_CORNERS)
-    height = 1.0 - (2.0 * np.arange(_CORNERS) + 1.0) / _CORNERS
-    ball = np.stack([np.cos(angles) * np.sqrt(1 - height**2), np.sin(angles) * np.sqrt(1 - height**2), height], 1)
-    for place, geom in enumerate(spec.geoms):
-        if geom.type == mujoco.mjtGeom.mjGEOM_ELLIPSOID and (geom.contype or geom.conaffinity):
-            mesh = spec.add_mesh(name=f"{NAME}_ellipsoid_{place}")
-            mesh.uservert = (ball * geom.size).ravel().tolist()
-            geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, mesh.name
 
 
 def _hinges(model: Any, spec: Any) -> list[Hinge]:

@@ -126,6 +126,7 @@ pub(super) fn contacts_of(kinds: (Kind, Kind)) -> usize {
     match kinds {
         (Kind::Field, _) => FIELD_CONTACTS,
         (Kind::Sphere, _) | (Kind::Plane, Kind::Sphere) => 1,
+        (Kind::Ellipsoid, _) | (_, Kind::Ellipsoid) => 1,
         (Kind::Plane, Kind::Capsule) => 2,
         (Kind::Capsule, Kind::Capsule) => 2,
         (Kind::Capsule, _) => 3,
@@ -267,6 +268,10 @@ pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -
                 [*radius, *half_height, 0.0],
                 libm::hypot(*radius, *half_height),
             ),
+            Shape::Ellipsoid { radii } => {
+                let longest = radii.iter().copied().fold(0.0, f64::max);
+                (Kind::Ellipsoid, *radii, longest)
+            }
             Shape::Mesh(mesh) => {
                 for hull in &mesh.hulls {
                     pieces.push(piece(

@@ -224,9 +224,10 @@ fn sides(scene: &Description, shapes: &[PlacedShape<'_>]) -> Vec<Side> {
             Shape::HeightField(_) => 1,
             Shape::Sphere { .. } => 2,
             Shape::Capsule { .. } => 3,
-            Shape::Cylinder { .. } => 4,
-            Shape::Box { .. } => 5,
-            Shape::Mesh(_) => 6,
+            Shape::Ellipsoid { .. } => 4,
+            Shape::Cylinder { .. } => 5,
+            Shape::Box { .. } => 6,
+            Shape::Mesh(_) => 7,
         };
         Side {
             of: shape

@@ -11,11 +11,14 @@
 //! | Pairs | Method | File |
 //! |---|---|---|
 //! | plane, sphere, capsule | closed form | `primitive/{planes,spheres,capsules}` |
+//! | plane and ellipsoid | the lowest point | `primitive/ellipsoids` |
 //! | plane and hull | the deepest vertex, with corners of a polygon beside it or others | `convex/plane_hull` |
 //! | capsule and box, of models from MuJoCo | MuJoCo's choice of features | `primitive/capsule_box` |
 //! | box and box | separating axes, clipping | `primitive/{boxes,box_faces}` |
+//! | sphere and ellipsoid | the point of the ellipsoid that is nearest to the centre | `primitive/ellipsoids` |
+//! | with an ellipsoid | GJK from the best of a few axes | `primitive/ellipsoids` |
 //! | with a cylinder or a hull | [`convex::pairs`]: axes, GJK, clipping | `primitive/cylinders`, `convex/hulls` |
-//! | height field | a convex prism below each of its triangles | `height_field`, `convex/{prisms,prism_hull}` |
+//! | height field | a convex prism below each of its triangles | `height_field`, `convex/{prisms,prism_ellipsoid,prism_hull}` |
 
 mod convex;
 mod height_field;
@@ -36,7 +39,9 @@ use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::{span, when};
 pub(super) use height_field::field_samples::Samples;
-pub use height_field::fields::{FieldBox, FieldCapsule, FieldCylinder, FieldHull, FieldSphere};
+pub use height_field::fields::{
+    FieldBox, FieldCapsule, FieldCylinder, FieldEllipsoid, FieldHull, FieldSphere,
+};
 use manifold::points::{Points, Room};
 pub use narrow::*;
 use surfaces::{friction, place_pairs, place_surface, softness, varying};

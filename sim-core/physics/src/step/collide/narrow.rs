@@ -4,7 +4,7 @@ use super::collide_group;
 use super::convex::hull::Hull;
 use super::convex::{hulls, plane_hull};
 use super::manifold::points::Points;
-use super::primitive::{boxes, capsules, cylinders, planes, spheres};
+use super::primitive::{boxes, capsules, cylinders, ellipsoids, planes, spheres};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::clip::Cut;
@@ -71,13 +71,13 @@ impl<C: Cx> Shape<C> {
         self.size[1]
     }
 
-    /// Half extents of a box, or of the bounding box of a hull [m].
+    /// Half extents of a box, or of the bounding box of a hull; radii of an ellipsoid [m].
     #[inline(always)]
     pub fn half_extents(&self) -> Vec3<C::F> {
         self.size
     }
 
-    /// Half extents of the bounding box of a box, cylinder or hull [m].
+    /// Half extents of the bounding box of a box, cylinder, ellipsoid or hull [m].
     #[inline(always)]
     pub fn bounding_box(&self, kind: Kind) -> Vec3<C::F> {
         let Vec3([x, y, _]) = self.size;
@@ -211,20 +211,27 @@ pairs! {
     PlaneCapsule(Plane, Capsule) = planes::plane_capsule;
     PlaneBox(Plane, Box) = planes::plane_box;
     PlaneCylinder(Plane, Cylinder) = planes::plane_cylinder;
+    PlaneEllipsoid(Plane, Ellipsoid) = ellipsoids::plane_ellipsoid;
     PlaneHull(Plane, Hull) = plane_hull::plane_hull;
     SphereSphere(Sphere, Sphere) = spheres::sphere_sphere;
     SphereCapsule(Sphere, Capsule) = spheres::sphere_capsule;
     SphereBox(Sphere, Box) = spheres::sphere_box;
     SphereCylinder(Sphere, Cylinder) = cylinders::sphere_cylinder;
+    SphereEllipsoid(Sphere, Ellipsoid) = ellipsoids::sphere_ellipsoid;
     SphereHull(Sphere, Hull) = hulls::sphere_hull;
     CapsuleCapsule(Capsule, Capsule) = capsules::capsule_capsule;
     CapsuleBox(Capsule, Box) = capsules::capsule_box;
     CapsuleCylinder(Capsule, Cylinder) = cylinders::capsule_cylinder;
+    CapsuleEllipsoid(Capsule, Ellipsoid) = ellipsoids::capsule_ellipsoid;
     CapsuleHull(Capsule, Hull) = hulls::capsule_hull;
     BoxBox(Box, Box) = boxes::box_box;
     BoxCylinder(Box, Cylinder) = cylinders::box_cylinder;
+    BoxEllipsoid(Box, Ellipsoid) = ellipsoids::box_ellipsoid;
     BoxHull(Box, Hull) = hulls::box_hull;
     CylinderCylinder(Cylinder, Cylinder) = cylinders::cylinder_cylinder;
+    CylinderEllipsoid(Cylinder, Ellipsoid) = ellipsoids::cylinder_ellipsoid;
     CylinderHull(Cylinder, Hull) = hulls::cylinder_hull;
+    EllipsoidEllipsoid(Ellipsoid, Ellipsoid) = ellipsoids::ellipsoid_ellipsoid;
+    EllipsoidHull(Ellipsoid, Hull) = ellipsoids::ellipsoid_hull;
     HullHull(Hull, Hull) = hulls::hull_hull;
 }

@@ -149,7 +149,7 @@ fn add_moments<F: Num>(
 
 /// Place of two dofs in the mass matrix; as in MuJoCo, dofs of different branches do not damp each other.
 #[inline(always)]
-fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
+pub(in crate::step) fn shared<R>(m: &Constants<R>, first: usize, second: usize) -> Option<usize> {
     // row of the later dof, which has entries for those on its path to the root alone
     let (lower, upper) = (first.max(second), first.min(second));
     let (start, end) = m.dofs[lower].entries;

@@ -28,6 +28,8 @@ const READS: &[A] = &[
     A::Rotation,
     A::Velocity,
     A::BiasForce,
+    A::TenMoment,
+    A::TenBias,
     A::MassMatrix,
     A::SmoothForce,
     A::EfcD,

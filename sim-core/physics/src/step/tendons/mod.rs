@@ -8,6 +8,7 @@
 //! A tendon that is pulled by a unit pulls its bodies with these forces. Where it bends around a shape, the shape has a force
 //! at either end of the arc. Moments are then as those of any forces: those that move together cancel.
 
+pub mod armature;
 mod flat;
 mod inner;
 mod outer;

@@ -15,6 +15,7 @@ use crate::constants::{Body, Motion};
 use crate::lane::{Cx, Num};
 use crate::math::spatial::{ANGULAR, LINEAR, Spatial, symmetric};
 use crate::math::vec3::{Mat3, Vec3};
+use crate::step::tendons::armature;
 use crate::step::tree::kinematics::from_reference;
 use crate::step::{BlockOf, ConstantsOf, gravity, masses, param};
 
@@ -76,6 +77,7 @@ pub(in crate::step) fn inverse_dynamics<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b
         b.work.missing[j] = armature.fma(cx.get(&b.joint_qdd[j]), b.work.missing[j]);
     }
     free_joints::add_armature_forces(cx, m, b);
+    armature::add_armature_forces(cx, m, b);
 }
 
 /// Writes the accelerations of all body origins less gravity, and the angular ones, to `force`. Returns that of a static body.

@@ -2,6 +2,7 @@
 //!
 //! `pairs` is the general case; a pair of two hulls begins in `hulls`, one with a prism in `prisms`.
 
+pub mod ellipsoid;
 pub mod features;
 pub mod gjk;
 pub mod hull;
@@ -13,6 +14,7 @@ pub mod plane_hull;
 pub mod posed;
 pub mod prism;
 pub mod prism_axes;
+pub mod prism_ellipsoid;
 pub mod prism_hull;
 pub mod prisms;
 pub mod restart;

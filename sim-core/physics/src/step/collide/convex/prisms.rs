@@ -1,5 +1,5 @@
 //! A prism of a height field against sphere, capsule, box and cylinder: the contacts of one prism. A hull is in
-//! [`super::prism_hull`].
+//! [`super::prism_hull`], an ellipsoid in [`super::prism_ellipsoid`].
 //!
 //! All is in the field's axes, from the centre of the shape, which is the first of the pair; the prism is the second.
 //!
@@ -31,8 +31,8 @@ use crate::when;
 /// A prism has walls where others begin. Along those the way out is short where a shape overlaps the prism by little: MuJoCo takes
 /// it, and shapes that slide over level ground catch on every triangle. Where the ground is a wall, its own triangles are steep.
 pub(in crate::step::collide) const FACING: f64 = 0.5;
-/// Any normal is a way out: of spheres and capsules, as in MuJoCo.
-const ANY: f64 = -2.0;
+/// Any normal is a way out: of spheres, capsules and ellipsoids, as in MuJoCo.
+pub(in crate::step::collide) const ANY: f64 = -2.0;
 
 /// The narrow phase of a height field and a kind of shape.
 pub trait FieldNarrow {

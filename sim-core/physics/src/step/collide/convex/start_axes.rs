@@ -1,4 +1,4 @@
-//! Axes of a shape and a cylinder that GJK may start from, by the shapes' reaches. None of them is exact, but most pairs are
+//! Axes of a shape and a cylinder or an ellipsoid that GJK may start from, by the shapes' reaches. None of them is exact, but most pairs are
 //! apart along one.
 
 use super::hull_axes::{Reach, SeparatingAxis, better_axis};
@@ -69,7 +69,15 @@ impl<F: Num, A: Reach<F> + Copy, B: Reach<F> + Copy> StartAxes<'_, F, A, B> {
     /// The axis of the cylinder.
     #[inline(always)]
     pub fn cylinder_axis(&self) -> BestStart<F> {
-        self.along(unit_z())
+        self.own_axis(2)
+    }
+
+    /// An axis of the frame, that of the second shape.
+    #[inline(always)]
+    pub fn own_axis(&self, j: usize) -> BestStart<F> {
+        let mut unit = Vec3::zero();
+        unit[j] = F::c(1.0);
+        self.along(unit)
     }
 
     /// An axis of the first shape.

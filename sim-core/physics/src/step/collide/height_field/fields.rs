@@ -21,6 +21,7 @@ use crate::lane::{Cx, MaskOf, Num, Real, Table};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
 use crate::step::collide::convex::prism::Prism;
 use crate::step::collide::convex::prism_axes::FieldReach;
+use crate::step::collide::convex::prism_ellipsoid::OfEllipsoid;
 use crate::step::collide::convex::prism_hull::OfHull;
 use crate::step::collide::convex::prisms::{FieldNarrow, OfBox, OfCapsule, OfCylinder, OfSphere};
 use crate::step::collide::manifold::points::{Points, Room};
@@ -68,6 +69,7 @@ fields! {
     FieldCapsule(OfCapsule) = "capsule";
     FieldBox(OfBox) = "box";
     FieldCylinder(OfCylinder) = "cylinder";
+    FieldEllipsoid(OfEllipsoid) = "ellipsoid";
     FieldHull(OfHull) = "convex hull";
 }
 

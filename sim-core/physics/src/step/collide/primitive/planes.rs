@@ -22,7 +22,7 @@ const fn upright<F: Num>() -> f64 {
 
 /// Adds the contact of a point of a shape with the plane, half-way between both.
 #[inline(always)]
-fn add_plane_contact<C: Cx>(
+pub(in crate::step::collide) fn add_plane_contact<C: Cx>(
     cx: &mut C,
     pair: &ShapePair<'_, C>,
     at: Vec3<C::F>,
