@@ -170,6 +170,8 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         members = {int(value): key for key, value in getattr(mujoco, kind).__members__.items()}
         values = np.asarray(getattr(model, name)).astype(int)
         used = sorted(set(values.tolist()))
+        if unknown := [value for value in used if value not in members]:
+            raise SceneError(f"{name} is {unknown[0]}, which is no {kind}; give one of its members")
         found[name] = np.array([used.index(value) for value in values], np.int32)
         found[f"{name}.names"] = as_bytes([members[value] for value in used])
     text = bytes(model.names)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from batch_reference import Lockstep, N, difference, separate
 
-from tightloop.errors import ArgumentError
 from tightloop.mujoco import Batch
 
 XML = """
@@ -217,23 +216,3 @@ def test_compensation_of_a_model_without_any_starts_with_set_const() -> None:
             mujoco.mj_setConst(models[sim], mujoco.MjData(models[sim]))
         lockstep.step(nstep=5)
         lockstep.assert_equal(("qpos", "qvel"), 1e-9)
-
-
-@pytest.mark.parametrize(
-    ("field", "place", "message"),
-    [
-        ("geom_solimp", (2, 1, 4), "sim 2: geom_solimp has another power"),
-        ("pair_friction", (3, 0, 1), "sim 3: pair_friction differs between the two tangents"),
-        ("jnt_range", (1, 3, 0), None),
-    ],
-)
-def test_what_no_parameter_expresses_is_refused(field: str, place: tuple[int, ...], message: str | None) -> None:
-    with Batch(model_of(), N, 1) as batch:
-        batch.expand(field)[place] += 0.5
-        if message is None:
-            batch.step()
-            return
-        # the others run
-        batch.step([0])
-        with pytest.raises(ArgumentError, match=message):
-            batch.step()

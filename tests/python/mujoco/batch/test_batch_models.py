@@ -129,22 +129,15 @@ def test_values_that_tightloop_cannot_vary_are_refused_by_simulation_and_field()
         with pytest.raises(ValueError, match=r"body_mass.*`model/cart`"):
             batch.step()
         mass[3, 1] = 1.0
-        for field in ("timestep", "integrator", "body_iquat", "qpos_spring", "jnt_margin"):
-            values, message = batch.expand(field), f"sim 2: {field} differs from the model's"
-            own = getattr(model.opt, field, None)
-            own = getattr(model, field) if own is None else np.array(own)
-            assert values.shape == (N, *own.shape)
+        for field in ("body_parentid", "jnt_type", "dof_treeid", "actuator_trnid"):
+            values, message = batch.expand(field), f"sim 2: {field} differs from the model's and says how a model"
+            own = getattr(model, field)
             np.testing.assert_array_equal(values, np.repeat(own[None], N, axis=0))
             values[2] += 1
             for call in (batch.step, batch.forward, batch.reset):
                 with pytest.raises(ValueError, match=message):
                     call()
             values[2] = own
-        damping = batch.expand("dof_damping")
-        damping[1, -1] = 0.1
-        with pytest.raises(ValueError, match="sim 1: dof_damping of a free joint"):
-            batch.forward()
-        damping[1, -1] = 0.0
         flags = batch.expand("enableflags")
         flags[4] |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         with pytest.raises(ValueError, match="sim 4: sleep"):
@@ -223,17 +216,6 @@ def test_rays_and_jacobians_see_the_geoms_of_each_simulation(field, place, chang
         with pytest.raises(ValueError, match="sim 1: body_weldid differs"):
             batch.rays(pnt, vec, dist)
         other[1, 1] = model.body_weldid[1]
-        if field == "geom_size":
-            with pytest.raises(ValueError, match="sim 2: geom_size differs"):
-                batch.step()
-
-
-def test_masses_in_a_medium_are_not_expanded() -> None:
-    xml = XML.format(contacts=0).replace("<worldbody>", '<option density="1.2"/><worldbody>', 1)
-    with Batch(mujoco.MjModel.from_xml_string(xml), N, 1) as batch:
-        with pytest.raises(ValueError, match="body_mass cannot differ between simulations of a medium"):
-            batch.expand("body_mass")
-        batch.step()
 
 
 def test_set_const_computes_constants_of_each_simulation() -> None:

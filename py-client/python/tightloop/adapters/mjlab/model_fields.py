@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tightloop.adapters.environment import library
 from tightloop.mujoco.batch.constants import set_const
-from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions, is_visual
+from tightloop.mujoco.batch.expansions import CONSTANTS, Expansions, is_idle
 from tightloop.mujoco.batch.shapes import geoms_of_shapes
 
 torch: Any = library("torch", install="torch")
@@ -38,7 +38,7 @@ class ModelFields:
 
     def acts(self, name: str) -> bool:
         """Whether a field may change the motion, so that it is ours and not MuJoCo-Warp's."""
-        return name in self._expansions and not is_visual(name)
+        return name in self._expansions and not is_idle(name)
 
     def expand(self, name: str) -> None:
         """Give a field a value per world; see `Expansions.get`. One that has some keeps them."""

@@ -10,6 +10,7 @@ The rows of a batch are the truth. A world of the simulation is in one of three 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from tightloop._core import Frame
 from tightloop.arrays.frames import FAULTED
+from tightloop.errors import CommandRefused
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.joints import JointMap
 from tightloop.mujoco.batch.layout import StateLayout
@@ -34,6 +36,8 @@ Mask = NDArray[np.bool_]
 _HELD = ("ctrl", "eq_active", "mocap_pos", "mocap_quat")
 #: Name of the model in the scene.
 MODEL = "model"
+#: A world in a message of a simulation.
+_WORLD = re.compile(r"\b(worlds? )(\d+)")
 #: Most substeps of a frame.
 _SUBSTEPS_MAX = 100
 #: Fields that simulations of this release have; filled by the first launch.
@@ -48,39 +52,44 @@ class Engine:
         layout: Its state.
         bindings: The rows.
         options: ``threads``, ``precision`` and ``device`` of the launch.
+        sims: Simulations that have a world here, ascending; all if left out.
 
     Attributes:
         scene: The scene with the model alone.
         frame: The newest frame, or None before the first one of a launch.
-        writes_rows: Whether each call starts from the rows alone.
         params: Names of the parameters that vary.
         substeps: Steps of a frame of the simulation.
-        silenced: Simulations whose controls count as 0, ``(num_sims,)``.
+        dtype: Of its precision.
+        members: The simulations that have a world here, ascending; None for all.
+        silenced: Worlds whose controls count as 0, ``(worlds,)``.
     """
 
-    def __init__(self, model: Any, layout: StateLayout, bindings: Bindings, options: dict[str, Any]) -> None:
+    def __init__(
+        self, model: Any, layout: StateLayout, bindings: Bindings, options: dict[str, Any], sims: Array | None = None
+    ) -> None:
         self.scene = Scene.from_mujoco(model, name=MODEL)
         self._layout, self._bindings, self._options = layout, bindings, options
         self._joints = JointMap(model)
-        self._sims, self._nv = len(bindings.rows), model.nv
+        self.members = sims
+        self._worlds, self._nv = len(bindings.rows if sims is None else sims), model.nv
         self._fields = {"qpos", "qvel"} | ({"act"} if model.na else set())
         self.params: set[str] = set()
         self._sim: Sim | None = None
         self._launched_with = (0, 0, 0)
         self._snapshot: Snapshot | None = None
-        self._stale, self._parked = np.ones(self._sims, bool), np.zeros(self._sims, bool)
+        self._stale, self._parked = np.ones(self._worlds, bool), np.zeros(self._worlds, bool)
         # what the worlds hold: controls, equalities and mocap bodies as in a row, and joint forces
         self._held_at = {name: layout.at(name) for name in _HELD if layout.at(name).start < layout.at(name).stop}
         self._held: dict[str, Array] = {}
-        self._force = np.zeros((self._sims, self._nv))
+        self._force = np.zeros((self._worlds, self._nv))
         self._sent: dict[str, Array] = {}
         # columns of a row that a write of the state sets: positions to warm start
         self._motion = slice(layout.at("qpos").start, layout.at("qacc_warmstart").stop)
         self.frame: Frame | None = None
-        self.writes_rows = False
         self.substeps = 1
+        self.dtype = np.dtype(np.float64 if options["precision"] == "f64" else np.float32)
         self._common = 0
-        self.silenced = np.zeros(self._sims, bool)
+        self.silenced = np.zeros(self._worlds, bool)
 
     @property
     def sim(self) -> Sim:
@@ -97,6 +106,11 @@ class Engine:
         if not _known_fields:
             _known_fields.update(field["name"] for field in self.sim.info["known_fields"])
         return _known_fields
+
+    @property
+    def _rows(self) -> Array:
+        """The rows of the worlds."""
+        return self.per_world(self._bindings.rows)
 
     def require(self, *, fields: Iterable[str] = (), params: Iterable[str] = ()) -> None:
         """Let the next access of `sim` have fields and varying parameters."""
@@ -130,7 +144,7 @@ class Engine:
         self.scene.substeps = self.substeps
         self._sim = sim = launch(
             self.scene,
-            worlds=self._sims,
+            worlds=self._worlds,
             fields=sorted(self._fields),
             params=sorted(self.params),
             watch_worlds=1,
@@ -145,20 +159,56 @@ class Engine:
             self._snapshot = self._snapshot and self._snapshot.with_model(sim.info["model_hash"])
         else:
             self._stale[:], self._parked[:], self._sent = True, False, {}
-            self._let_go(np.ones(self._sims, bool))
+            self._let_go(np.ones(self._worlds, bool))
         return sim
 
     def _let_go(self, mask: Mask) -> None:
         """Note that worlds hold what they start with."""
         start = self._layout.start(-1)
         for name, at in self._held_at.items():
-            self._held.setdefault(name, np.zeros((self._sims, at.stop - at.start)))[mask] = start[at]
+            self._held.setdefault(name, np.zeros((self._worlds, at.stop - at.start)))[mask] = start[at]
         self._force[mask] = 0.0
+
+    def per_world(self, values: Array) -> Array:
+        """Return the values of the worlds, of those of all simulations, ``(num_sims, ...)``."""
+        return values if self.members is None else values[self.members]
+
+    def worlds(self, ids: Any) -> Any:
+        """Return the worlds of simulations, which are indices, or a slice of all."""
+        return ids if self.members is None or isinstance(ids, slice) else np.searchsorted(self.members, ids)
+
+    def sims(self, worlds: Array) -> Array:
+        """Return the simulations of worlds."""
+        return worlds if self.members is None else self.members[worlds]
+
+    def has(self, ids: Array) -> Mask:
+        """Return which simulations have a world here."""
+        return np.ones(len(ids), bool) if self.members is None else np.isin(ids, self.members)
 
     def mark_stale(self, ids: Any) -> None:
         """Let the rows of simulations be written before they run."""
-        self._stale[ids] = True
-        self._parked[ids] = False
+        worlds = self.worlds(ids)
+        self._stale[worlds] = True
+        self._parked[worlds] = False
+
+    def dismiss(self, ids: Array) -> None:
+        """Put the worlds of simulations back to their start, without forces: they run elsewhere now."""
+        self.mark_stale(ids)
+        if self._sim is None:
+            return
+        gone = np.zeros(self._worlds, bool)
+        gone[self.worlds(ids)] = True
+        self._rest(gone)
+
+    def _rest(self, mask: Mask) -> None:
+        """Reset worlds, which then hold what they start with."""
+        sent = self._sent.get("body_f")
+        if sent is not None:
+            self.frame = self.sim.params.write(mask=mask, body_f=np.zeros((self._worlds, sent.shape[1] // 6, 6)))
+            sent[mask] = 0.0
+        self.frame = None
+        self.frame = self.sim.reset(mask=mask)
+        self._let_go(mask)
 
     def sync(self, mask: Mask, params: dict[str, Array]) -> Frame:
         """Bring rows and parameters of the simulations of a mask into their worlds; return a frame of it.
@@ -167,15 +217,15 @@ class Engine:
             mask: The simulations, ``(num_sims,)``.
             params: Parameters by name, ``(num_sims, ...)``; other rows than those of the mask do not matter.
         """
-        sim = self.sim
+        sim, mask = self.sim, self.per_world(mask)
         back = self._parked & mask
         if back.any() and self._snapshot is not None:
             self.frame = sim.restore(self._snapshot, worlds=back)
             self._parked &= ~mask
         for name, values in params.items():
-            self._send(name, values, mask)
-        rows, last = self._bindings.rows[:, self._motion], self._bindings.last[:, self._motion]
-        changed = mask if self.writes_rows else mask & (self._stale | (rows != last).any(axis=1))
+            self._send(name, self.per_world(values), mask)
+        rows, last = (self.per_world(array[:, self._motion]) for array in (self._bindings.rows, self._bindings.last))
+        changed = mask if self._bindings.is_bound("state") else mask & (self._stale | (rows != last).any(axis=1))
         if changed.any():
             self._revive(changed)
             self.frame = self._write(changed)
@@ -185,15 +235,22 @@ class Engine:
         return self.frame
 
     def _send(self, name: str, values: Array, mask: Mask) -> None:
-        flat = values.reshape(self._sims, -1)
+        flat = values.reshape(self._worlds, -1)
         sent = self._sent.get(name)
         if sent is None:
             sent = self._sent[name] = np.full(flat.shape, np.nan)
         changed = mask & (flat != sent).any(axis=1)
         if changed.any():
             safe = np.where(changed[:, None], flat, flat[changed][:1])
-            self.frame = self.sim.params.write(mask=changed, **{name: safe.reshape(values.shape)})
+            try:
+                self.frame = self.sim.params.write(mask=changed, **{name: safe.reshape(values.shape)})
+            except CommandRefused as error:
+                raise CommandRefused(self._by_simulation(str(error))) from error
             sent[changed] = flat[changed]
+
+    def _by_simulation(self, message: str) -> str:
+        """A message that counts worlds, with simulations in their place."""
+        return _WORLD.sub(lambda world: f"{world[1]}{self.sims(np.array([int(world[2])]))[0]}", message)
 
     def _revive(self, changed: Mask) -> None:
         """A faulted world takes no writes."""
@@ -207,7 +264,7 @@ class Engine:
                 self._sent["body_f"][frozen] = 0.0
 
     def _write(self, changed: Mask) -> Frame:
-        rows = self._bindings.rows[changed]
+        rows = self._rows[changed]
         qpos, qvel = rows[:, self._layout.at("qpos")], rows[:, self._layout.at("qvel")]
         parts = {"joint_q": self._joints.positions(qpos), "joint_qd": self._joints.velocities(qpos, qvel)}
         act = rows[:, self._layout.at("act")]
@@ -217,7 +274,7 @@ class Engine:
             return self._write_states(parts)
         whole = {}
         for name, values in parts.items():
-            whole[name] = np.zeros((self._sims, values.shape[1]))
+            whole[name] = np.zeros((self._worlds, values.shape[1]))
             whole[name][changed] = values
         return self._write_states(whole, changed)
 
@@ -227,7 +284,7 @@ class Engine:
 
     def _commands(self, mask: Mask) -> tuple[dict[str, Array], Array]:
         """What worlds shall hold, by name, and joint forces: of the rows in the mask, elsewhere what they hold."""
-        rows = self._bindings.rows
+        rows = self._rows
         held = {name: np.where(mask[:, None], rows[:, at], self._held[name]) for name, at in self._held_at.items()}
         if self.silenced.any() and "ctrl" in held:
             held["ctrl"][mask & self.silenced] = 0.0
@@ -242,11 +299,12 @@ class Engine:
         return held, force
 
     def park(self, mask: Mask) -> None:
-        """Keep the worlds outside a mask, which the steps of the others are going to move."""
+        """Keep the worlds outside a mask of simulations, which the steps of the others are going to move."""
+        mask = self.per_world(mask)
         others = ~mask & ~self._parked & ~self._stale
         if not others.any():
             return
-        if self.writes_rows:
+        if self._bindings.is_bound("state"):
             self._stale |= others
             return
         taken = self.sim.snapshot()
@@ -256,7 +314,8 @@ class Engine:
         self._parked |= others
 
     def hold(self, mask: Mask) -> Frame:
-        """Let the worlds of a mask hold what their rows have besides the state, without a step."""
+        """Let the worlds of a mask of simulations hold what their rows have besides the state, without a step."""
+        mask = self.per_world(mask)
         held, force = self._commands(mask)
         pushed = (force != self._force).any(axis=1)
         if pushed.any():
@@ -278,7 +337,8 @@ class Engine:
         return {name: values for name, values in held.items() if not np.array_equal(values, self._held[name])}
 
     def step(self, mask: Mask) -> Frame:
-        """Step all worlds, those of a mask with what their rows have besides the state."""
+        """Step all worlds, those of a mask of simulations with what their rows have besides the state."""
+        mask = self.per_world(mask)
         held, force = self._commands(mask)
         commands = self._changed(held)
         if not np.array_equal(force, self._force):
@@ -291,4 +351,4 @@ class Engine:
     @property
     def forces_turn(self) -> bool:
         """Whether joint forces must be sent before each step: those of free joints depend on the positions."""
-        return self._joints.has_free and bool(self._bindings.rows[:, self._layout.at("qfrc_applied")].any())
+        return self._joints.has_free and bool(self._rows[:, self._layout.at("qfrc_applied")].any())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -28,23 +29,35 @@ _SWITCHES = {
 }
 #: Constants that `mj_setConst` computes and that act: what makes contacts and limits soft.
 _SOFTNESS = ("body_invweight0", "dof_invweight0")
-#: Model fields that act.
+#: Model fields that become parameters.
 _VARYING = (*_SAME, *masses.FIELDS, *gains.PARAMS, *varied_fields.FIELDS, *_SOFTNESS)
 #: What ``mj_setConst`` computes. All but `_SOFTNESS` is for reading.
 CONSTANTS = (
     "body_subtreemass body_invweight0 dof_invweight0 dof_M0 tendon_length0 tendon_invweight0 actuator_length0 "
     "actuator_acc0 cam_pos0 cam_poscom0 cam_mat0 light_pos0 light_poscom0 light_dir0"
 ).split()
-#: Beginnings of the names of fields without influence on the motion.
-_VISUAL = ("cam_", "light_", "mat_", "skin_", "geom_rgba", "geom_matid", "geom_group", "site_rgba", "site_group")
+#: Beginnings of the names of fields without influence on the motion: of pictures, of the user, of MuJoCo's broad phase.
+_IDLE = (
+    *("cam_", "light_", "mat_", "skin_", "geom_rgba", "geom_matid", "geom_group", "site_rgba", "site_group"),
+    *("site_matid", "tendon_rgba", "tendon_width", "tendon_group", "tendon_matid", "jnt_group", "geom_rbound"),
+    *("geom_aabb", "bvh_", "body_user", "jnt_user", "geom_user", "site_user", "tendon_user", "actuator_user"),
+    *("sensor_user", "body_margin", "body_contype", "body_conaffinity"),
+)
 #: Beginnings of the names of assets, which are not expanded.
 _ASSETS = ("mesh_", "hfield_", "tex_", "skin_", "bvh_", "text_", "name_", "numeric_", "tuple_", "key_", "plugin_")
+#: Integers of ``MjModel`` that may differ. Others say how the model is built.
+_CHOICES = frozenset(
+    """eq_type eq_active0 geom_type geom_contype geom_conaffinity geom_condim geom_priority jnt_limited jnt_group
+    jnt_actfrclimited jnt_actgravcomp pair_dim tendon_limited tendon_actfrclimited tendon_group actuator_actlimited
+    actuator_ctrllimited actuator_forcelimited actuator_actearly actuator_biastype actuator_dyntype actuator_gaintype
+    actuator_group body_simple body_sameframe geom_sameframe site_sameframe dof_simplenum""".split()
+)
 _SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
-def is_visual(name: str) -> bool:
+def is_idle(name: str) -> bool:
     """Whether a field of this name has no influence on the motion."""
-    return name.startswith(_VISUAL)
+    return name.startswith(_IDLE)
 
 
 def can_vary(name: str) -> bool:
@@ -67,6 +80,12 @@ class Expansions:
         self._inertias = masses.Inertias(np.asarray(model.body_iquat))
         #: Whether MuJoCo compensates gravity at all, ``(num_sims,)``: it skips it until `set_const` finds a share.
         self.compensated = np.full(num_sims, bool((np.asarray(model.body_gravcomp) > 0.0).any()))
+
+    def over(self, model: Any) -> Expansions:
+        """Return the same fields as parameters of another model, which has the values that are no parameters."""
+        other = copy.copy(self)
+        other._model, other._inertias = model, masses.Inertias(np.asarray(model.body_iquat))
+        return other
 
     def __contains__(self, name: str) -> bool:
         """Whether ``MjModel`` or ``MjOption`` has a field of this name."""
@@ -108,21 +127,26 @@ class Expansions:
         wanted = scalar if dtype is None else np.dtype(dtype)
         if wanted != scalar and not (scalar == np.float64 and wanted == np.float32):
             raise ArgumentError(f"{name} cannot be {wanted}; expand it as {scalar}")
-        if name in masses.FIELDS and (self._model.opt.density > 0.0 or self._model.opt.viscosity > 0.0):
-            raise ArgumentError(
-                f"{name} cannot differ between simulations of a medium, which drags boxes of the model's masses; "
-                f"set density and viscosity to 0, or {self._instead}"
-            )
         if name not in self._arrays:
             self._arrays[name] = np.repeat(template[None], self._sims, axis=0).astype(wanted)
         if self._arrays[name].dtype != wanted:
             raise ArgumentError(f"{name} is already expanded as {self._arrays[name].dtype}; give that dtype")
         return self._arrays[name]
 
+    def _is_parameter(self, name: str) -> bool:
+        """Whether a field acts as parameters. A medium drags boxes of the model's masses."""
+        in_medium = self._model.opt.density > 0.0 or self._model.opt.viscosity > 0.0
+        return name in _VARYING and not (in_medium and name in masses.FIELDS)
+
+    @property
+    def _masses(self) -> tuple[str, ...]:
+        """Parameters of expanded masses."""
+        return masses.params([name for name in self._arrays if self._is_parameter(name)])
+
     def params(self) -> tuple[str, ...]:
         """Return the parameters that must vary for what is expanded."""
         found = [_SAME[name] for name in self._arrays if name in _SAME]
-        found.extend(masses.params(self.names))
+        found.extend(self._masses)
         found.extend(param for name, param in gains.PARAMS.items() if name in self._arrays)
         for name in self._arrays:
             if name in varied_fields.FIELDS:
@@ -148,29 +172,23 @@ class Expansions:
         self.check_fixed(ids)
         found = {}
         for name, array in self._arrays.items():
+            if not self._is_parameter(name):
+                continue
+            self._check_finite(name, ids)
+            wrong, problem = self._inexpressible(name, array[ids])
+            if wrong.any():
+                sim = ids[int(wrong.reshape(len(ids), -1).any(axis=1).argmax())]
+                raise ArgumentError(f"sim {sim}: {name} {problem}")
             if name in _SAME:
-                self._check_same(name, ids)
                 found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
             elif name in gains.PARAMS:
-                self._check_finite(name, ids)
-                changed = gains.changed_muscles(self._model, name, array[ids])
-                if changed.any():
-                    sim = ids[int(changed.argmax())]
-                    raise ArgumentError(f"sim {sim}: {name} of a muscle cannot differ from the model's")
                 found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
             elif name in varied_fields.FIELDS:
-                self._check_finite(name, ids)
-                field = varied_fields.FIELDS[name]
-                wrong = field.wrong(self._model, array[ids])
-                if wrong.any():
-                    raise ArgumentError(f"sim {ids[int(wrong.argmax())]}: {name} {field.problem}")
-                found |= field.values(self._model, array, shapes)
-            elif name in masses.FIELDS or name in _SOFTNESS:
-                self._check_finite(name, ids)
+                found |= varied_fields.FIELDS[name].values(self._model, array, shapes)
         if "body_gravcomp" in found:
             found["body_gravcomp"] = found["body_gravcomp"] * self.compensated[:, None]
         bodies = self._model.nbody
-        wanted = masses.params(self.names)
+        wanted = self._masses
         if "body_mass" in wanted:
             found["body_mass"] = np.broadcast_to(self.of("body_mass"), (self._sims, bodies)).astype(np.float64)
             tensors = self._inertias.of(self.of("body_inertia"))
@@ -188,25 +206,67 @@ class Expansions:
         flags = [getattr(mujoco.mjtDisableBit, flag, 0) for flag in _SWITCHES.get(name, ())]
         return 0.0 if any(self._model.opt.disableflags & int(flag) for flag in flags) else 1.0
 
-    def _check_finite(self, name: str, ids: Array) -> Array:
+    def _check_finite(self, name: str, ids: Array) -> None:
         array = self._arrays[name][ids].reshape(len(ids), -1)
         wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(wrong):
             raise ArgumentError(f"sim {ids[wrong[0]]}: {name} is not finite")
-        return array
 
-    def _check_same(self, name: str, ids: Array) -> None:
-        array = self._check_finite(name, ids)
-        if name == "gravity":
-            return
+    def _inexpressible(self, name: str, values: Array) -> tuple[NDArray[np.bool_], str]:
+        """Return which elements of values ``(n, ...)`` no parameter can express, and what is wrong with them."""
+        if name in varied_fields.FIELDS:
+            field = varied_fields.FIELDS[name]
+            return field.wrong(self._model, values), field.problem
+        if name in gains.PARAMS:
+            return gains.changed_muscles(self._model, name, values), "of a muscle cannot differ from the model's"
+        if name not in _SAME or name == "gravity":
+            return np.zeros(values.shape, bool), ""
         # tightloop has other dofs for free joints: velocities of the centre of mass, in world axes
         free = self._model.jnt_type[self._model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
-        moved = (array[:, free] != getattr(self._model, name)[free].astype(array.dtype)).any(axis=1)
-        if moved.any():
-            sim = ids[int(moved.argmax())]
-            raise ArgumentError(
-                f"sim {sim}: {name} of a free joint cannot differ from the model's; write other dofs only"
-            )
+        moved = (values != getattr(self._model, name).astype(values.dtype)) & free
+        return moved, "of a free joint cannot differ from the model's; write other dofs only"
+
+    def fixed(self, ids: Array) -> dict[str, tuple[NDArray[np.bool_], Array]]:
+        """Return the fields with values that only another model has.
+
+        Returns:
+            By name: the simulations that need it, ``(len(ids),)``, and the field of these models, ``(len(ids), ...)``.
+            Elements that parameters express are the model's.
+
+        Raises:
+            ArgumentError: A value says how the model is built, is not finite, or enables sleep.
+        """
+        self.check_sleep(ids)
+        self.check_structure(ids)
+        fields = {}
+        for name, array in self._arrays.items():
+            if not self._is_parameter(name):
+                if not (name in CONSTANTS or is_idle(name)) and (needs := self.differs(name, ids)).any():
+                    fields[name] = needs, array[ids]
+                continue
+            self._check_finite(name, ids)
+            wrong, _ = self._inexpressible(name, array[ids])
+            if wrong.any():
+                template = np.asarray(self._template(name)).astype(array.dtype)
+                fields[name] = wrong.reshape(len(ids), -1).any(axis=1), np.where(wrong, array[ids], template)
+        return fields
+
+    def check_structure(self, ids: Array, free: tuple[str, ...] = ()) -> None:
+        """Check that integers that say how the model is built, but for those of `free`, have the values of the model.
+
+        Raises:
+            ArgumentError: One has not; the message has the simulation and the field.
+        """
+        for name, array in self._arrays.items():
+            is_choice = name in _CHOICES or not hasattr(self._model, name) or is_idle(name)
+            if array.dtype.kind not in "iub" or is_choice or name in free:
+                continue
+            differs = self.differs(name, ids)
+            if differs.any():
+                raise ArgumentError(
+                    f"sim {ids[int(differs.argmax())]}: {name} differs from the model's and says how a model is built; "
+                    f"{self._instead}"
+                )
 
     def check_sleep(self, ids: Array) -> None:
         """Check that no simulation is to sleep.
@@ -227,20 +287,21 @@ class Expansions:
         # NaN is no other value than NaN
         return ((given != template) & ~(np.isnan(given) & np.isnan(template))).reshape(len(ids), -1).any(axis=1)
 
-    def check_fixed(self, ids: Array, free: tuple[str, ...] = ()) -> None:
-        """Check that fields that cannot differ, but for those of `free`, have the values of the model.
+    def check_fixed(self, ids: Array) -> None:
+        """Check that fields that are no parameters have the values of the model.
 
         Raises:
             ArgumentError: One has not; the message has the simulation and the field.
         """
         self.check_sleep(ids)
         for name in self._arrays:
-            if name in _VARYING or name in CONSTANTS or name in free or is_visual(name):
+            if self._is_parameter(name) or name in CONSTANTS or is_idle(name):
                 continue
             differs = self.differs(name, ids)
             if differs.any():
                 sim = ids[int(differs.argmax())]
                 raise ArgumentError(
-                    f"sim {sim}: {name} differs from the model's; tightloop varies {', '.join(_VARYING)}, "
-                    f"so {self._instead}"
+                    f"sim {sim}: {name} differs from the model's; parameters are "
+                    f"{', '.join(field for field in _VARYING if self._is_parameter(field))}"
+                    f"{'' if name not in _VARYING else ' in a medium'}; {self._instead}"
                 )

@@ -41,7 +41,7 @@ def factors(model: Any, name: str, values: Array) -> Array:
 
 
 def changed_muscles(model: Any, name: str, values: Array) -> Array:
-    """Return in which simulations a muscle has other numbers than in the model, ``(n,)``.
+    """Return which numbers of muscles are other ones than in the model, ``(n, nu, 10)``.
 
     Args:
         model: The model.
@@ -49,5 +49,4 @@ def changed_muscles(model: Any, name: str, values: Array) -> Array:
         values: Its values, ``(n, nu, 10)``.
     """
     muscles = np.asarray(getattr(model, _LAWS[name][0])) == _MUSCLES[name]
-    fixed = np.asarray(getattr(model, name))[muscles].astype(values.dtype)
-    return (values[:, muscles] != fixed).any(axis=(1, 2))
+    return (values != np.asarray(getattr(model, name)).astype(values.dtype)) & muscles[:, None]

@@ -18,7 +18,7 @@ from tightloop.sim.rays import RayHits, Rays, check_lengths, points
 
 Array = NDArray[Any]
 
-#: Fields of the model that say where geoms are and what rays meet; each simulation may have its own.
+#: Fields of the model that say where geoms are and what rays meet. Each simulation may have its own, also of integers.
 SEEN = (
     *("qpos0", "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mocapid", "body_sameframe"),
     *("jnt_pos", "jnt_axis", "geom_type", "geom_dataid", "geom_pos", "geom_quat", "geom_size", "geom_sameframe"),

@@ -15,15 +15,13 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
 from tightloop.mujoco.batch.bindings import Bindings
 from tightloop.mujoco.batch.constants import set_const
-from tightloop.mujoco.batch.engine import Engine
 from tightloop.mujoco.batch.expansions import Expansions
 from tightloop.mujoco.batch.fields import Fields
 from tightloop.mujoco.batch.layout import StateLayout
 from tightloop.mujoco.batch.library import mujoco
 from tightloop.mujoco.batch.queries import SEEN, Queries
 from tightloop.mujoco.batch.selection import Selection
-from tightloop.mujoco.batch.shapes import geoms_of_shapes
-from tightloop.mujoco.batch.stepping import Stepping
+from tightloop.mujoco.batch.variants import Variants
 from tightloop.mujoco.batch.views import NamedViews
 from tightloop.sim.sim import Sim
 
@@ -86,16 +84,10 @@ class Batch(NamedViews):
         self._bindings = Bindings(self._fields, self._layout, self._layout.start(-1), self.num_sims)
         self._expansions = Expansions(self._own, self.num_sims)
         options = {"threads": self.num_threads, "precision": precision, "device": device}
-        self._engine = Engine(self._own, self._layout, self._bindings, options)
-        self._stepping = Stepping(
-            self._own,
-            self._fields,
-            self._layout,
-            self._bindings,
-            self._engine,
-            expansions=self._expansions,
-            forward=bool(forward),
+        self._variants = Variants(
+            self._own, self._bindings, self._fields, self._expansions, options, forward=bool(forward)
         )
+        self._engine = self._variants.base.engine
         self._queries = Queries(
             self._own, self._layout, self._engine.scene, self.num_threads, expansions=self._expansions
         )
@@ -103,16 +95,17 @@ class Batch(NamedViews):
 
     @property
     def sim(self) -> Sim:
-        """The simulation underneath. It is launched at its first use, and again after new `bind` and `expand` calls.
+        """The simulation underneath, of the given model.
 
-        A call of the batch writes only what changed in the batch's arrays, so do not step or write it yourself.
+        It is launched at its first use, and again after new `bind` and `expand` calls. A call of the batch writes only
+        what changed in the batch's arrays, so do not step or write it yourself.
         """
         with self._lock:
             return self._engine.sim
 
     def close(self) -> None:
-        """End the simulation underneath. Arrays stay valid."""
-        self._engine.close()
+        """End the simulations underneath. Arrays stay valid."""
+        self._variants.close()
 
     def __enter__(self) -> Batch:
         return self
@@ -140,9 +133,7 @@ class Batch(NamedViews):
         """
         with self._lock:
             if name == "state":
-                array = self._bindings.get(name, dtype)
-                self._engine.writes_rows = True
-                return array
+                return self._bindings.get(name, dtype)
             if name not in self._fields:
                 if name in self._expansions:
                     raise ArgumentError(f'{name} is a field of the model; use expand("{name}")')
@@ -154,7 +145,7 @@ class Batch(NamedViews):
                     self._fields.check(name, self._engine.known_fields)
                 array = self._bindings.get(name, dtype)
                 if not empty:
-                    self._stepping.add(name)
+                    self._variants.add(name)
                 return array
             return self._bindings.get(name, dtype)
 
@@ -164,9 +155,11 @@ class Batch(NamedViews):
         ``gravity``, ``qpos0``, ``jnt_range``, ``dof_armature``, ``dof_damping``, ``dof_frictionloss``,
         ``dof_invweight0``, ``body_mass``, ``body_inertia``, ``body_ipos``, ``body_gravcomp``, ``body_invweight0``,
         ``geom_friction``, ``geom_solref``, ``geom_solimp``, ``pair_friction``, ``actuator_gainprm``,
-        ``actuator_biasprm`` and ``actuator_forcerange`` act from the next call on. Other fields may be read, and a step
-        refuses values that differ from the model's. Fields for pictures, and what else `set_const` computes, have no
-        effect on the motion.
+        ``actuator_biasprm`` and ``actuator_forcerange`` act from the next call on, as parameters of the simulations.
+        Any other value, such as a ``timestep`` or a ``geom_size``, gets a model of its own, which is compiled at the
+        next call and shared by the simulations with the same values. A batch has at most 64 models. Integers that say
+        how the model is built cannot differ. Fields for pictures, and what else `set_const` computes, have no effect on
+        the motion.
 
         Args:
             name: The field.
@@ -197,6 +190,7 @@ class Batch(NamedViews):
 
         Raises:
             ArgumentError: An argument, or a value in an array of the batch, is not valid; nothing was stepped.
+            RuntimeError: The model of a simulation does not run; the message names the first one. The others are done.
             DaemonLost: The daemon underneath went away.
         """
         with self._lock:
@@ -207,7 +201,7 @@ class Batch(NamedViews):
             if history is not None:
                 _check_history(history, (len(chosen), nstep, self.nstate))
             if len(chosen):
-                self._stepping.step(chosen, self._params(chosen), nstep, history)
+                self._variants.step(chosen, nstep, history)
 
     def forward(self, ids: ArrayLike | None = None) -> None:
         """Fill all bound fields at the current state and controls, as ``mj_forward`` does.
@@ -217,11 +211,12 @@ class Batch(NamedViews):
 
         Raises:
             ArgumentError: As `step`.
+            RuntimeError: As `step`.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
             if len(chosen):
-                self._stepping.forward(chosen, self._params(chosen))
+                self._variants.forward(chosen)
 
     def reset(self, ids: ArrayLike | None = None, keyframe: int = -1) -> None:
         """Reset simulations to the model's start or a keyframe, then fill all bound fields.
@@ -234,6 +229,7 @@ class Batch(NamedViews):
 
         Raises:
             ArgumentError: There is no such keyframe; or as `step`.
+            RuntimeError: As `step`.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
@@ -241,7 +237,7 @@ class Batch(NamedViews):
             if not -1 <= keyframe < self._own.nkey:
                 raise ArgumentError(f"keyframe {keyframe} is out of range; the model has {self._own.nkey}")
             if len(chosen):
-                self._stepping.reset(chosen, self._params(chosen), keyframe)
+                self._variants.reset(chosen, keyframe)
 
     def set_const(self, ids: ArrayLike | None = None) -> None:
         """Compute the constants of expanded fields as ``mj_setConst`` does, and expand those that changed.
@@ -292,11 +288,11 @@ class Batch(NamedViews):
 
         Raises:
             ArgumentError: A shape or dtype is wrong, a value is not finite, a direction has length 0, or a simulation
-                differs from the model in what neither places nor shapes geoms.
+                differs from the model in an integer that says how it is built.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
-            self._expansions.check_fixed(chosen.indices, SEEN)
+            self._expansions.check_structure(chosen.indices, SEEN)
             rows = self._bindings.pending(chosen.ids)
             filled, options = (dist, geomid, normal), (geomgroup, flg_static, bodyexclude)
             self._queries.rays(rows, chosen.indices, self.num_sims, given=(pnt, vec), filled=filled, options=options)
@@ -314,19 +310,14 @@ class Batch(NamedViews):
             ids: As in `step`.
 
         Raises:
-            ArgumentError: A shape or dtype is wrong, or a simulation differs from the model in what places no bodies.
+            ArgumentError: A shape or dtype is wrong, or a simulation differs from the model in an integer that says how
+                it is built.
         """
         with self._lock:
             chosen = Selection(ids, self.num_sims)
-            self._expansions.check_fixed(chosen.indices, SEEN)
+            self._expansions.check_structure(chosen.indices, SEEN)
             rows = self._bindings.pending(chosen.ids)
             self._queries.jac(rows, chosen.indices, self.num_sims, (jacp, jacr), (point, body))
-
-    def _params(self, chosen: Selection) -> dict[str, Array]:
-        shapes: list[int] = []
-        if self._expansions.needs_shapes:
-            shapes = geoms_of_shapes(self._own, self._engine.sim.shape_names)
-        return self._expansions.values(shapes, chosen.indices)
 
 
 def _integer(name: str, value: Any) -> int:

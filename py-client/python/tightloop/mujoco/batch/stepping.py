@@ -69,6 +69,11 @@ class Stepping:
         # how often a step reads the controls
         self._evaluations = 4 if model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4) else 1
 
+    @property
+    def _lags(self) -> bool:
+        """Whether fields are of the state before the last substep."""
+        return bool(self._names) and not self._forward
+
     def add(self, name: str) -> None:
         """Fill a bound field from now on, from the simulation's field of that name."""
         self._names.append(name)
@@ -77,15 +82,20 @@ class Stepping:
         # `hold` checks the controls that it sets
         self._engine.require(fields=(name, "ctrl") if accelerates else (name,))
 
-    def step(self, chosen: Selection, params: dict[str, Array], nstep: int, history: Array | None) -> None:
-        """Advance simulations; see `Batch.step`."""
-        rows, ids, mask = self._bindings.rows, chosen.ids, chosen.mask
-        lags = bool(self._names) and not self._forward
-        in_between = history is not None or lags or self._engine.forces_turn
-        frames = nstep * self._engine.plan(1) if in_between else self._engine.plan(nstep)
+    def plan(self, nstep: int, *, has_history: bool) -> int:
+        """Return the frames of a call that steps."""
+        in_between = has_history or self._lags or self._engine.forces_turn
+        return nstep * self._engine.plan(1) if in_between else self._engine.plan(nstep)
+
+    def prepare_step(self, chosen: Selection, params: dict[str, Array]) -> None:
+        """Bring everything that was written, but controls and forces, to the simulation, for `step`."""
         self._begin(chosen, params, resets=self._resets)
+
+    def step(self, chosen: Selection, frames: int, nstep: int, history: Array | None) -> None:
+        """Advance simulations that `prepare_step` has prepared; see `Batch.step`."""
+        rows, ids, mask = self._bindings.rows, chosen.ids, chosen.mask
         self._check_controls(chosen, times=nstep * self._evaluations)
-        if lags and nstep == 1:
+        if self._lags and nstep == 1:
             self._evaluate(chosen)
         if len(chosen) < len(rows):
             self._engine.park(mask)
@@ -100,26 +110,23 @@ class Stepping:
                 self._take(frame, ids)
             if history is not None:
                 history[:, substep] = rows[ids]
-            if lags and substep == nstep - 2:
+            if self._lags and substep == nstep - 2:
                 frame = None
                 self._evaluate(chosen)
         assert frame is not None
         self._take(frame, ids)
         self._count(frame, chosen)
+        frame = None
         if self._forward:
-            frame = None
             self._evaluate(chosen)
         self._bindings.settle(ids)
 
-    def forward(self, chosen: Selection, params: dict[str, Array]) -> None:
-        """Fill bound fields; see `Batch.forward`."""
+    def prepare(self, chosen: Selection, params: dict[str, Array]) -> None:
+        """Bring everything that was written, but controls and forces, to the simulation, for `finish`."""
         self._begin(chosen, params, resets=False)
-        self._check_controls(chosen)
-        self._evaluate(chosen)
-        self._bindings.settle(chosen.ids)
 
-    def reset(self, chosen: Selection, params: dict[str, Array], keyframe: int) -> None:
-        """Reset simulations; see `Batch.reset`."""
+    def prepare_reset(self, chosen: Selection, params: dict[str, Array], keyframe: int) -> None:
+        """Reset the rows of simulations, and bring them to the simulation, for `finish`; see `Batch.reset`."""
         start = self._starts(chosen.indices, keyframe)
         bindings, ids = self._bindings, chosen.ids
         bindings.collect(ids)
@@ -130,10 +137,13 @@ class Stepping:
         bindings.warnings[ids] = 0
         # a reset clears the warm start, too
         self._engine.mark_stale(ids)
-        self._begin(chosen, params, resets=False)
+        self.prepare(chosen, params)
+
+    def finish(self, chosen: Selection) -> None:
+        """Fill bound fields at the state that was prepared."""
         self._check_controls(chosen)
         self._evaluate(chosen)
-        bindings.settle(ids)
+        self._bindings.settle(chosen.ids)
 
     def _begin(self, chosen: Selection, params: dict[str, Array], *, resets: bool) -> None:
         """Bring everything that was written to the simulation, except controls and forces."""
@@ -150,7 +160,8 @@ class Stepping:
                 self._restart(sims, int(warning))
                 rows = bindings.rows[chosen.ids]
         for name in _FINITE:
-            finite = np.isfinite(rows[:, layout.at(name)])
+            with np.errstate(over="ignore"):
+                finite = np.isfinite(rows[:, layout.at(name)].astype(self._engine.dtype))
             if not finite.all():
                 sim = chosen.indices[int(finite.all(axis=1).argmin())]
                 raise ArgumentError(f"sim {sim}: {name} is NaN or infinite; write another value")
@@ -167,10 +178,10 @@ class Stepping:
         """
         columns = self._layout.at("ctrl")
         ctrl = self._bindings.rows[chosen.ids, columns]
-        self._engine.silenced[chosen.ids] = False
+        self._engine.silenced[self._engine.worlds(chosen.ids)] = False
         if ctrl.size and not np.abs(ctrl).max() <= _VALUE_MAX:
             sims = chosen.indices[~(np.abs(ctrl) <= _VALUE_MAX).all(axis=1)]
-            self._engine.silenced[sims] = True
+            self._engine.silenced[self._engine.worlds(sims)] = True
             self._bindings.warnings[sims, int(_WARN.mjWARN_BADCTRL), 1] += times
 
     def _starts(self, sims: Array, keyframe: int = -1) -> Array:
@@ -200,7 +211,7 @@ class Stepping:
     def _publish(self, frame: Frame, ids: Any) -> None:
         derived = self._bindings.derived
         for name in self._names:
-            values = _array(frame, name)[ids]
+            values = _array(frame, name)[self._engine.worlds(ids)]
             derived[name][ids] = values.reshape(len(values), *derived[name].shape[1:])
             if name == "sensordata":
                 # the simulation's clock counts from its own reset
@@ -210,19 +221,21 @@ class Stepping:
     def _take(self, frame: Frame, ids: Any) -> None:
         """Bring the state of a frame into the rows."""
         rows, layout = self._bindings.rows, self._layout
-        rows[ids, layout.at("qpos")] = frame.qpos[ids]
-        rows[ids, layout.at("qvel")] = frame.qvel[ids]
+        worlds = self._engine.worlds(ids)
+        rows[ids, layout.at("qpos")] = frame.qpos[worlds]
+        rows[ids, layout.at("qvel")] = frame.qvel[worlds]
         if self._model.na:
-            rows[ids, layout.at("act")] = _array(frame, "act")[ids]
+            rows[ids, layout.at("act")] = _array(frame, "act")[worlds]
 
     def _count(self, frame: Frame, chosen: Selection) -> None:
         """Count the simulation's warnings as MuJoCo's; a faulted world starts again."""
         status = frame.status
         if not status.any():
             return
-        full = np.flatnonzero(chosen.mask & ((status & _LEFT_OUT) != 0))
+        mask = self._engine.per_world(chosen.mask)
+        full = self._engine.sims(np.flatnonzero(mask & ((status & _LEFT_OUT) != 0)))
         self._bindings.warnings[full, int(_WARN.mjWARN_CONTACTFULL), 1] += 1
-        faulted = np.flatnonzero(chosen.mask & ((status & FAULTED) != 0))
+        faulted = self._engine.sims(np.flatnonzero(mask & ((status & FAULTED) != 0)))
         if len(faulted):
             self._restart(faulted, int(_WARN.mjWARN_BADQACC))
 

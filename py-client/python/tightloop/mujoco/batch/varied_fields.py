@@ -36,8 +36,8 @@ class Field(NamedTuple):
     params: Callable[[Any], tuple[str, ...]]
     #: Their values ``(n, columns)``, of a model, values of the field ``(n, ...)`` and the geom of each shape.
     values: Callable[[Any, Array, list[int]], Values]
-    #: Of a model and values of the field: in which simulations a value cannot be taken over, ``(n,)``.
-    wrong: Callable[[Any, Array], Array] = lambda model, array: np.zeros(len(array), bool)
+    #: Of a model and values of the field: which elements no parameter expresses, a mask of the same shape.
+    wrong: Callable[[Any, Array], Array] = lambda model, array: np.zeros(array.shape, bool)
     #: What is wrong with these, after the name of the field.
     problem: str = ""
 
@@ -64,7 +64,7 @@ def _ranges(model: Any, ranges: Array, shapes: list[int]) -> Values:
 
 def _moved_balls(model: Any, ranges: Array) -> Array:
     balls = np.asarray(model.jnt_limited).astype(bool) & ~_axes(model)
-    return (ranges[:, balls] != model.jnt_range[balls].astype(ranges.dtype)).any(axis=(1, 2))
+    return (ranges != model.jnt_range.astype(ranges.dtype)) & balls[:, None]
 
 
 def _forceranges(model: Any, ranges: Array, shapes: list[int]) -> Values:
@@ -98,8 +98,9 @@ def _solimp(model: Any, solimp: Array, shapes: list[int]) -> Values:
 
 
 def _other_powers(model: Any, solimp: Array) -> Array:
-    powers = model.geom_solimp[:, _POWER].astype(solimp.dtype)
-    return (solimp[..., _POWER] != powers).any(axis=1)
+    differs = solimp != model.geom_solimp.astype(solimp.dtype)
+    differs[..., :_POWER] = False
+    return differs
 
 
 def _pair_friction_params(model: Any) -> tuple[str, ...]:
@@ -113,7 +114,7 @@ def _pair_friction(model: Any, friction: Array, shapes: list[int]) -> Values:
 def _turned_frictions(model: Any, friction: Array) -> Array:
     slides, rolls = np.asarray(model.pair_dim) > 1, np.asarray(model.pair_dim) > _SLIDING + 1
     differs = slides & (friction[..., 0] != friction[..., 1]) | rolls & (friction[..., 3] != friction[..., 4])
-    return differs.any(axis=1)
+    return np.repeat(differs[..., None], friction.shape[-1], axis=-1)
 
 
 #: Fields by their names.
