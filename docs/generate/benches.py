@@ -122,7 +122,6 @@ stand or lie on the ground. mjbatch runs MuJoCo C.
 - mjbatch computes in double precision with its own release of MuJoCo, tightloop in single precision.
 - gymnasium's models use RK4, with four evaluations per step. Its Humanoid asks for PGS with 50 iterations. MuJoCo runs
   that. tightloop solves the same problem with Newton's method.
-- The torso of dm_control's quadruped is an ellipsoid. Its contacts are off on all sides, since tightloop refuses them.
 - The Shadow hand asks for one iteration of the solver. So the solver has not converged, on any side.
 - tightloop keeps up to four points per pair of meshes, and so has more contacts in the rows of the Shadow hand.
 - No side evaluates sensors. In the row `mjlab Go1, feet only`, no other part collides.
@@ -264,6 +263,24 @@ random, and episodes that end begin anew.
             "ratio": "ratio",
             "asked_ratio": "asked",
         },
+    ),
+    "jax_steps": Bench(
+        "Steps in a program of JAX, beside a loop of Python",
+        """A cart with a pole, physics on one thread. A side makes its steps in a row, and its fastest turn counts.
+
+- `sim.step` and `JaxSim` are a simulation under random forces, `VectorEnv` and `JaxEnv` the task CartPoleBalance.
+- JAX runs the steps of a side as one program, a `lax.scan`.
+""",
+        {"worlds": "worlds", "side": "side", "us_a_step": "step [µs]", "more_us": "more than Python [µs]"},
+    ),
+    "policy_rollout": Bench(
+        "A policy inside of the daemon, beside a loop of an environment",
+        """The quadruped follows commands by its trained policy, physics on one thread. The fastest turn counts.
+
+- Without a policy the targets are held, and the robot stands.
+- The environment draws commands, and computes rewards and ends of episodes, too.
+""",
+        {"worlds": "worlds", "side": "side", "us_a_frame": "control frame [µs]"},
     ),
     "terrain": Bench(
         "Rough ground, beside MuJoCo on one thread",

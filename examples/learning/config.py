@@ -53,7 +53,7 @@ PRESETS = {
         5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
     ),
     "QuadrupedVelocityRough": Config(
-        30.0,
+        60.0,
         512,
         16,
         epochs=2,
