@@ -170,7 +170,6 @@ class Expansions:
             ArgumentError: A value cannot be taken over; the message has the simulation and the field.
         """
         self.check_fixed(ids)
-        found = {}
         for name, array in self._arrays.items():
             if not self._is_parameter(name):
                 continue
@@ -179,6 +178,14 @@ class Expansions:
             if wrong.any():
                 sim = ids[int(wrong.reshape(len(ids), -1).any(axis=1).argmax())]
                 raise ArgumentError(f"sim {sim}: {name} {problem}")
+        return self.checked_values(shapes)
+
+    def checked_values(self, shapes: list[int]) -> dict[str, Array]:
+        """Return the parameters as `values` does, where `fixed` has checked the simulations that are about to run."""
+        found = {}
+        for name, array in self._arrays.items():
+            if not self._is_parameter(name):
+                continue
             if name in _SAME:
                 found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
             elif name in gains.PARAMS:

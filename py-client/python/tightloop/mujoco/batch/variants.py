@@ -68,13 +68,13 @@ class Variant:
         )
         self._model = model
 
-    def params(self, chosen: Selection) -> dict[str, Array]:
-        """Return the parameters of all simulations after a check of the chosen ones; see `Expansions.values`."""
+    def params(self) -> dict[str, Array]:
+        """Return the parameters of all simulations, of which the chosen ones have been checked."""
         self.engine.require(params=self.expansions.params())
         shapes: list[int] = []
         if self.expansions.needs_shapes:
             shapes = geoms_of_shapes(self._model, self.engine.sim.shape_names)
-        return self.expansions.values(shapes, chosen.indices)
+        return self.expansions.checked_values(shapes)
 
 
 #: A call's share of a variant: its chosen simulations, and their parameters.
@@ -171,13 +171,13 @@ class Variants:
         """Return the share of each variant, and what is wrong with the simulations whose model does not run."""
         failed = self._move(chosen)
         if len(self._running) == 1 and not failed:
-            return [(self.base, chosen, self.base.params(chosen))], failed
+            return [(self.base, chosen, self.base.params())], failed
         ids = np.setdiff1d(chosen.indices, list(failed))
         parts: list[Part] = []
         for number in np.unique(self._home[ids]).tolist():
             variant, sims = self._running[number], Selection(ids[self._home[ids] == number], len(self._home))
             variant.engine.substeps = self.base.engine.substeps
-            parts.append((variant, sims, variant.params(sims)))
+            parts.append((variant, sims, variant.params()))
         return parts, failed
 
     def _move(self, chosen: Selection) -> dict[int, str]:
