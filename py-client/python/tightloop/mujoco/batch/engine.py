@@ -201,14 +201,11 @@ class Engine:
         self._rest(gone)
 
     def _rest(self, mask: Mask) -> None:
-        """Reset worlds, which then hold what they start with."""
-        sent = self._sent.get("body_f")
-        if sent is not None:
-            self.frame = self.sim.params.write(mask=mask, body_f=np.zeros((self._worlds, sent.shape[1] // 6, 6)))
-            sent[mask] = 0.0
-        self.frame = None
+        """Reset worlds, which then hold what they start with, and have no forces."""
         self.frame = self.sim.reset(mask=mask)
         self._let_go(mask)
+        if "body_f" in self._sent:
+            self._sent["body_f"][mask] = 0.0
 
     def sync(self, mask: Mask, params: dict[str, Array]) -> Frame:
         """Bring rows and parameters of the simulations of a mask into their worlds; return a frame of it.
@@ -258,10 +255,7 @@ class Engine:
             return
         frozen = changed & ((self.frame.status & FAULTED) != 0)
         if frozen.any():
-            self.frame = self.sim.reset(mask=frozen)
-            self._let_go(frozen)
-            if "body_f" in self._sent:
-                self._sent["body_f"][frozen] = 0.0
+            self._rest(frozen)
 
     def _write(self, changed: Mask) -> Frame:
         rows = self._rows[changed]
