@@ -177,6 +177,7 @@ impl DaemonError {
                 | BackendError::CompileLimit { .. }
                 | BackendError::DoubleOnGpu
                 | BackendError::LastSubstepOnGpu
+                | BackendError::NoSlipOnGpu
                 | BackendError::LastSubstepSensors,
             ) => "ArgumentError",
             Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })

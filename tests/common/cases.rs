@@ -5,8 +5,10 @@ use sim_model::{
     Body, Collision, Cone, Description, Model, MujocoOptions, Pose, Shape, Site, UrdfOptions,
 };
 use sim_physics::arrays::Block;
+use sim_physics::constants::options::{DryRow, NoSlip};
 use sim_physics::constants::params::Param;
 use sim_physics::constants::{Constants, Motion};
+use sim_physics::lane::Fixed;
 use std::path::Path;
 
 /// The repository, whichever of its crates the test is of.
@@ -42,7 +44,7 @@ struct Near {
 }
 
 /// All of them.
-pub fn cases() -> [Case; 11] {
+pub fn cases() -> [Case; 12] {
     [
         fr3(),
         every_joint(),
@@ -50,6 +52,7 @@ pub fn cases() -> [Case; 11] {
         shapes(Cone::Elliptic, None),
         shapes(Cone::Pyramidal, Some(5)),
         arm_and_cube(),
+        swept(),
         every_param(),
         mujoco("implicit"),
         mujoco("runge_kutta"),
@@ -188,6 +191,36 @@ pub fn fields() -> Case {
 /// The FR3 between a table and a cube, its fingers about the cube.
 pub fn arm_and_cube() -> Case {
     arm_at_cube("arm and cube", [])
+}
+
+/// The same with sweeps over dry frictions and contacts, whose pairs are visited backwards.
+pub fn swept() -> Case {
+    let mut case = arm_and_cube();
+    let m = &mut case.m;
+    let numbers = &mut m.contacts.tables.numbers;
+    m.sensors.ranks = Fixed {
+        base: numbers.len(),
+        stride: 1,
+        rows: m.contacts.pairs.len(),
+    };
+    numbers.extend((0..m.contacts.pairs.len()).rev().map(|rank| rank as f32));
+    let first = m.equalities.len();
+    let dry_rows = (0..m.frictions.len()).map(|place| DryRow {
+        row: first + place,
+        tie: None,
+        place,
+    });
+    m.solver.noslip = Some(NoSlip {
+        iterations: 3,
+        tolerance: 0.0,
+        least_gain: 1e-6,
+        dry_rows: dry_rows.collect(),
+    });
+    assert!(!m.frictions.is_empty());
+    Case {
+        name: "swept",
+        ..case
+    }
 }
 
 /// The same where every parameter varies.

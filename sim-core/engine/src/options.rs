@@ -184,9 +184,11 @@ pub(crate) fn backends(
         cpu::create(model, groups, precision, options.lanes, layout, running)
     };
     let lags = options.outputs_at == OutputsAt::LastSubstep;
+    let sweeps = model.constants().solver.noslip.is_some();
     let note = match &options.device {
         Device::Gpu { .. } if lags => return Err(BackendError::LastSubstepOnGpu),
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
+        Device::Gpu { .. } if sweeps => return Err(BackendError::NoSlipOnGpu),
         Device::Gpu { adapter, cache } => return Ok((on_gpu(adapter, cache)?, None)),
         Device::Cpu => None,
         Device::Auto { .. } if lags => {
@@ -194,6 +196,9 @@ pub(crate) fn backends(
         }
         Device::Auto { .. } if precision == Precision::F64 => {
             Some("the processor: a GPU computes in single precision".to_owned())
+        }
+        Device::Auto { .. } if sweeps => {
+            Some("the processor: a GPU has no noslip_iterations".to_owned())
         }
         Device::Auto { .. } if groups.all() < AUTO_WORLDS => {
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))

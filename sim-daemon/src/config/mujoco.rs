@@ -89,7 +89,13 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
             ", warmstart off"
         };
         let (kind, ls_tolerance) = (parts.integrator, parts.ls_tolerance);
-        format!("{kind:?}{implicit}{safe}{islands}{warm}, ls_tolerance {ls_tolerance}")
+        let noslip = match parts.noslip {
+            (0, _) => String::new(),
+            (iterations, tolerance) => {
+                format!(", noslip_iterations {iterations} to {tolerance}")
+            }
+        };
+        format!("{kind:?}{implicit}{safe}{islands}{warm}, ls_tolerance {ls_tolerance}{noslip}")
     });
     summary["options"] = json!({
         "integrator": integrator,

@@ -103,7 +103,7 @@ _NAMED = {
     "sensor": "nsensor",
 }
 _REAL_OPTIONS = (
-    *("timestep", "gravity", "tolerance", "ls_tolerance", "impratio"),
+    *("timestep", "gravity", "tolerance", "ls_tolerance", "noslip_tolerance", "impratio"),
     *("density", "viscosity", "wind", "magnetic"),
 )
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")

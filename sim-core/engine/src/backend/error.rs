@@ -267,6 +267,11 @@ pub enum BackendError {
         "a GPU evaluates outputs at the state in the frame; use outputs_at = frame, or device = cpu"
     )]
     LastSubstepOnGpu,
+    /// Sweeps of friction on a GPU.
+    #[error(
+        "a GPU has no `noslip_iterations`; launch with device=\"cpu\", or read the model without them: without=(\"noslip_iterations\",)"
+    )]
+    NoSlipOnGpu,
     /// Sensors at the last of the four points of a Runge-Kutta substep, where MuJoCo has none.
     #[error(
         "field `sensordata` of a Runge-Kutta step is evaluated at the state in the frame; use outputs_at = frame, or leave the field out"

@@ -45,7 +45,7 @@ use sim_physics::constants::passive::GravityCompensation;
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::Springs;
 use sim_physics::constants::{Constants, Coupled, Delay};
-use solver::{classes_of_roots, is_damped, newton, precompiled_parts, search};
+use solver::{classes_of_roots, is_damped, newton, noslip, precompiled_parts, search};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use ties::add_ties;
@@ -88,7 +88,9 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     add_integrator(&mut m, scene);
     let placed = placed_shapes(scene, &builder.carriers, &m);
     let rules = Rules::new(scene, &builder.carriers, &m, &reference);
+    m.solver.noslip = noslip(scene, &m, reference.mean_inertia);
     add_contacts(&mut m, scene, &placed, &rules)?;
+    m.contacts.ordered_corners = m.solver.noslip.is_some();
     if let Some(search) = &mut m.solver.search {
         search.classes = classes_of_roots(&search.roots, &m.contacts);
     }
@@ -137,6 +139,7 @@ fn bodies_alone(
             tolerance: 0.0,
             refinements: 0,
             search: None,
+            noslip: None,
         },
         varying: Varying::default(),
         delay: Delay::default(),

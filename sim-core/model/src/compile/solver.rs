@@ -4,8 +4,9 @@ use super::bodies::BodyBuilder;
 use super::inverse_weight::{self, Reference};
 use crate::description::{Description, Precompiled};
 use sim_physics::constants::contact::Contacts;
-use sim_physics::constants::options::{Integrator, Newton, Search};
+use sim_physics::constants::options::{DryRow, Integrator, Newton, NoSlip, Search};
 use sim_physics::constants::params::Param;
+use sim_physics::constants::ties::{Measure, TieLaw};
 use sim_physics::constants::{Body, Constants};
 
 /// Past this `f32` accelerations are refined. Rounding moved them by at most 5e-5 of their largest in 1400 states of
@@ -54,6 +55,60 @@ pub(super) fn search(scene: &Description, bodies: &[Body<f64>]) -> Option<Search
         roots: roots(bodies),
         classes: Vec::new(),
     })
+}
+
+/// Sweeps over the rows of friction, where a model asks for them: of several models, the most and the smallest tolerance.
+pub(super) fn noslip(
+    scene: &Description,
+    m: &Constants<f64>,
+    mean_inertia: f64,
+) -> Option<NoSlip<f64>> {
+    let asks = || precompiled_parts(scene).filter(|parts| parts.noslip.0 > 0);
+    let iterations = asks().map(|parts| parts.noslip.0).max()?;
+    let tolerance = asks()
+        .map(|parts| parts.noslip.1)
+        .fold(f64::INFINITY, f64::min);
+    Some(NoSlip {
+        iterations,
+        tolerance,
+        least_gain: tolerance * mean_inertia * m.dofs.len() as f64,
+        dry_rows: dry_rows(m),
+    })
+}
+
+/// Rows of dry friction in MuJoCo's order: those of dofs, then those of tendons.
+fn dry_rows(m: &Constants<f64>) -> Vec<DryRow> {
+    let mut of_dofs: Vec<(usize, DryRow)> = Vec::new();
+    let mut of_tendons = Vec::new();
+    for (place, friction) in m.frictions.iter().enumerate() {
+        let row = m.equalities.len() + place;
+        let dry = DryRow {
+            row,
+            tie: None,
+            place,
+        };
+        of_dofs.push((friction.dof, dry));
+    }
+    let mut first = m.joint_rows();
+    for (number, tie) in m.ties.iter().enumerate() {
+        let rows = (0..tie.rows).map(|place| DryRow {
+            row: first + place,
+            tie: Some(number),
+            place,
+        });
+        match (tie.law, &tie.measure) {
+            // a free joint has a row for each of its dofs
+            (TieLaw::Friction(_), Measure::Free(body)) => {
+                of_dofs.extend((m.bodies[*body].dof..).zip(rows));
+            }
+            (TieLaw::Friction(_), _) => of_tendons.extend(rows),
+            _ => {}
+        }
+        first += tie.rows;
+    }
+    of_dofs.sort_by_key(|&(dof, _)| dof);
+    let of_dofs = of_dofs.into_iter().map(|(_, dry)| dry);
+    of_dofs.chain(of_tendons).collect()
 }
 
 /// What robots that come compiled have.

@@ -55,6 +55,9 @@ pub struct Precompiled {
     pub integrator: Integrator,
     /// Share of the solver's tolerance to which it searches a line in `f64` [–].
     pub ls_tolerance: f64,
+    /// Most sweeps over the rows of friction after the solver, and the gain of one that ends them, `noslip_iterations` and
+    /// `noslip_tolerance` [–].
+    pub noslip: (usize, f64),
     /// Whether the solver handles trees that no constraint couples one by one in `f64`.
     pub islands: bool,
     /// Whether the solver may start from the last step's accelerations in `f64`.

@@ -1,6 +1,6 @@
 //! Bodies, joints, rows of constraints, and options.
 
-use sim_physics::constants::options::Newton;
+use sim_physics::constants::options::{DryRow, Newton, NoSlip};
 use sim_physics::constants::scan::HeightScan;
 use sim_physics::constants::site::{Column, Mount, Site};
 use sim_physics::constants::{
@@ -96,7 +96,17 @@ view! {
             "tolerance": tolerance,
             "refinements": refinements,
         }
-        Never { "search": search };
+        Never { "search": search }
+        Later { "noslip": noslip };
+    NoSlip<f64> as "NoSlip":
+        Always {
+            "iterations": iterations,
+            "tolerance": tolerance,
+            "least_gain": least_gain,
+            "dry_rows": dry_rows,
+        };
+    DryRow as "DryRow":
+        Always { "row": row, "tie": tie, "place": place };
     HeightScan<f64> as "HeightScan":
         Always {
             "mount": mount,

@@ -32,6 +32,7 @@ view! {
         Later { "turning": turning }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
+        Never { "ordered_corners": ordered_corners }
         => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
     Handles as "Handles":
         Always {

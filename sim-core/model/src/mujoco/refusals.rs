@@ -113,9 +113,6 @@ fn options(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
             other.unwrap_or("none")
         )),
     }
-    if file.integer("opt.noslip_iterations")? > 0 {
-        refused.push("option `noslip_iterations`: no support for it, set it to 0".to_owned());
-    }
     for (counted, what) in [("nflex", "flexes"), ("nplugin", "plugins")] {
         if file.integer(counted)? > 0 {
             refused.push(format!("model: no support for {what}"));

@@ -120,6 +120,10 @@ fn parts(
         touches_parent: has_flag(file, "mjDSBL_FILTERPARENT")?,
         integrator: integrator(file)?,
         ls_tolerance: file.real_or("opt.ls_tolerance", LS_TOLERANCE)?,
+        noslip: (
+            usize::try_from(file.integer("opt.noslip_iterations")?).unwrap_or(0),
+            file.real_or("opt.noslip_tolerance", NOSLIP_TOLERANCE)?,
+        ),
         islands: !has_flag(file, "mjDSBL_ISLAND")?,
         warm_start: !has_flag(file, "mjDSBL_WARMSTART")?,
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
@@ -131,6 +135,8 @@ fn parts(
 
 /// `ls_tolerance` of files that older versions wrote: MuJoCo's default [–].
 const LS_TOLERANCE: f64 = 0.01;
+/// The same of `noslip_tolerance` [–].
+const NOSLIP_TOLERANCE: f64 = 1e-6;
 
 /// Arrays of joints and dofs.
 struct JointArrays {

@@ -275,6 +275,8 @@ arrays! { m;
         // M a - τ, and the island of each dof, where the solver runs as MuJoCo's: see `step::solver::islands`
         gauss_gradient: GaussGradient [Scalar; m.island_dofs()] Scratch "N·m or N";
         island: Island [Scalar; m.island_dofs()] Scratch "–";
+        // M⁻¹ Jᵀ of the directions of friction of a contact, where they are swept
+        friction_steps: FrictionSteps [Scalar; if m.solver.noslip.is_some() { (DIRECTIONS_MAX - 1) * m.dofs.len() } else { 0 }] Scratch "rad/s² or m/s²";
         // row by row: J a - aref at the start, at the minimum (or its change), D, aref, force; distance to each limit
         jar: Jar [Scalar; m.rows()] Scratch "rad/s² or m/s²";
         jar_minimum: JarMinimum [Scalar; m.rows()] Scratch "rad/s² or m/s²";

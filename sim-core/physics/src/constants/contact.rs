@@ -70,6 +70,8 @@ recast! {
         pub named_pairs: Fixed,
         /// Whether capsules and boxes have the points of `collide::primitive::capsule_box`.
         pub two_point_capsule_boxes: bool,
+        /// Whether the corners of a box on a plane are in MuJoCo's order, which matters where contacts are swept.
+        pub ordered_corners: bool,
         /// Impedances of pairs.
         pub impedances: PairImpedances<R>,
         /// Bodies that contacts act on, among those of outputs.
@@ -584,6 +586,7 @@ impl<R: Real> Contacts<R> {
             mixing: Fixed::default(),
             named_pairs: Fixed::default(),
             two_point_capsule_boxes: false,
+            ordered_corners: false,
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),
         }

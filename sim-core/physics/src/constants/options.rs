@@ -29,7 +29,35 @@ recast! {
         pub refinements: usize,
         /// How the solver ends its iterations and line searches in `f64`, for models from MuJoCo.
         pub search: Option<Search<R>>,
+        /// What keeps contacts from a slow slip, where a model asks for it.
+        pub noslip: Option<NoSlip<R>>,
     }
+}
+
+recast! {
+    /// Sweeps over the rows of friction after the solver (`step/solver/noslip/mod.rs`).
+    #[derive(Clone, Debug)]
+    pub struct NoSlip<R> {
+        /// Most sweeps.
+        pub iterations: usize,
+        /// Gain of a sweep below which an island ends, over the trace of its mass matrix.
+        pub tolerance: R,
+        /// The same of a whole world, times mean inertia and dofs, where islands are not kept apart.
+        pub least_gain: R,
+        /// Rows of dry friction, in MuJoCo's order.
+        pub dry_rows: Vec<DryRow>,
+    }
+}
+
+/// A constraint row of dry friction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DryRow {
+    /// Its place among the rows.
+    pub row: usize,
+    /// The tie that it is of; none of a joint's.
+    pub tie: Option<usize>,
+    /// Its place among the rows of the tie, or among the frictions of joints.
+    pub place: usize,
 }
 
 recast! {
@@ -68,4 +96,4 @@ impl<R> Search<R> {
     }
 }
 
-same! { Integrator }
+same! { Integrator, DryRow }

@@ -18,7 +18,8 @@ recast! {
         /// Of each pair of shapes: 1 where MuJoCo's normal is ours, else -1; then of each sensor of contacts 1 where our normal
         /// points from its first object to its second, -1 where it is the other way, 0 where the pair is not of the sensor.
         pub pairs: Fixed,
-        /// Of each pair of shapes, its place in MuJoCo's order of contacts, where a sensor takes the first of them.
+        /// Of each pair of shapes, its place in MuJoCo's order of contacts, where a sensor takes the first of them or the solver
+        /// sweeps them.
         pub ranks: Fixed,
         /// What rangefinders see.
         pub geoms: Vec<RayGeom<R>>,

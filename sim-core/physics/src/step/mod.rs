@@ -80,6 +80,7 @@ macro_rules! every_stage {
             solver               [solver::Solver::<false>]                   Both;
             solver_turning       [solver::Solver::<true>]                    Both;
             refine               [solver::Refine]                            Both;
+            noslip               [solver::NoSlip]                            Both;
             integrate            [integrate::semi_implicit::Integrate]       Step;
             // in its place, as `schedule::step_stages` orders them
             runge_kutta_0        [integrate::runge_kutta::Begin]             RungeKutta;

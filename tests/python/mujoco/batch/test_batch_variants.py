@@ -285,7 +285,6 @@ def test_masses_in_a_medium_differ() -> None:
         ("timestep", np.nan, "timestep"),
         ("integrator", 99, "99"),
         ("integrator", int(mujoco.mjtIntegrator.mjINT_IMPLICIT), "mjINT_IMPLICIT"),
-        ("noslip_iterations", 3, "noslip_iterations"),
         ("geom_type", 99, "geom_type is 99"),
         ("geom_pos", np.nan, "geom_pos"),
     ],

@@ -28,7 +28,6 @@ def arm(*, option: str = "", geom: str = "", more: str = "", actuators: str = ""
 @pytest.mark.parametrize(
     ("parts", "without", "note"),
     [
-        ({"option": 'noslip_iterations="5"'}, "noslip_iterations", "slip a little"),
         ({"option": 'integrator="implicit"'}, "integrator", "mjINT_IMPLICITFAST takes the place"),
         ({"geom": 'fluidshape="ellipsoid"'}, "palm", "geom `palm` touches nothing"),
         ({"more": BALL_TENDON}, "odd", "tendon `odd` has length 0"),

@@ -4,7 +4,7 @@ use super::pieces::{PlacedShape, Rules, named_pair_place};
 use crate::description::{Description, Precompiled, Sense, Shape, Touching};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, Pair, TouchedBodies};
-use sim_physics::constants::sensors::{Reduction, Sensor, SensorKind};
+use sim_physics::constants::sensors::{Reduction, SensorKind, Sensors};
 use sim_physics::lane::Fixed;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -136,23 +136,20 @@ pub(in crate::compile) fn add_contact_sensors(
             columns.push(senses);
         }
     }
-    if columns.len() == 1 {
-        return;
+    // the first column alone is of no sensor
+    if columns.len() > 1 {
+        let table = Fixed {
+            base: constants.contacts.tables.numbers.len(),
+            stride: columns.len(),
+            rows: both.len(),
+        };
+        let numbers =
+            (0..both.len()).flat_map(|pair| columns.iter().map(move |column| column[pair]));
+        constants.contacts.tables.numbers.extend(numbers);
+        constants.sensors.pairs = table;
+        constants.sensors.records = records;
     }
-    let table = Fixed {
-        base: constants.contacts.tables.numbers.len(),
-        stride: columns.len(),
-        rows: both.len(),
-    };
-    let numbers = (0..both.len()).flat_map(|pair| columns.iter().map(move |column| column[pair]));
-    constants.contacts.tables.numbers.extend(numbers);
-    constants.sensors.pairs = table;
-    constants.sensors.records = records;
-    let takes_first = |sensor: &Sensor<f64>| match &sensor.kind {
-        SensorKind::Contact(contact) => contact.reduction == Reduction::First,
-        _ => false,
-    };
-    if constants.sensors.all.iter().any(takes_first) {
+    if constants.solver.noslip.is_some() || takes_first(&constants.sensors) {
         let ranks = ranks(&constants.contacts.pairs, &sides, shapes, rules);
         constants.sensors.ranks = Fixed {
             base: constants.contacts.tables.numbers.len(),
@@ -161,6 +158,14 @@ pub(in crate::compile) fn add_contact_sensors(
         };
         constants.contacts.tables.numbers.extend(ranks);
     }
+}
+
+/// Does a sensor take the first of its contacts?
+fn takes_first(sensors: &Sensors<f64>) -> bool {
+    sensors.all.iter().any(|sensor| match &sensor.kind {
+        SensorKind::Contact(contact) => contact.reduction == Reduction::First,
+        _ => false,
+    })
 }
 
 /// Place of each pair in MuJoCo's order of contacts (`mj_collision`): by the two bodies, then pairs that a model names, then by

@@ -252,6 +252,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
                 hull_tables: &t.hulls,
                 clip_tables: t.memory.cut,
                 two_point_capsule_boxes: t.two_point_capsule_boxes,
+                ordered_corners: t.ordered_corners,
             };
             // bounding box of the second shape, and of both where it pays
             let near = boxes_near::<C, N>(cx, t, p, &shapes, near);

@@ -71,6 +71,7 @@
 //! | `hold` | contacts that slide, and are assumed to stick |
 //! | `progress` | which worlds search, which have arrived, and what a pause saves |
 //! | `refine` | corrections by inverse dynamics, in `f32` |
+//! | `noslip` | forces of friction without regularisation, where a model asks for them |
 
 mod assembly;
 mod bracket;
@@ -82,6 +83,7 @@ mod islands;
 mod line;
 mod linear;
 mod newton;
+mod noslip;
 mod own_rows;
 mod progress;
 mod refine;
@@ -92,6 +94,7 @@ mod ties;
 mod turning;
 mod updates;
 
+pub use noslip::NoSlip;
 pub use refine::{Accelerations, Refine};
 
 use super::{BlockOf, ConstantsOf, Stage};

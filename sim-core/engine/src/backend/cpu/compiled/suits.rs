@@ -30,7 +30,9 @@ pub(super) fn suits(m: &Constants<f64>) -> bool {
         true => PARTS_MAX,
         false => TOUCHING_PARTS_MAX,
     };
-    m.pattern.len() <= ENTRIES_MAX && parts(m) * evaluations.count() <= parts_max
+    // the code of a sweep over rows of friction would have the factor of M once per row
+    let sweeps = m.solver.noslip.is_some();
+    !sweeps && m.pattern.len() <= ENTRIES_MAX && parts(m) * evaluations.count() <= parts_max
 }
 
 /// What a bend of a tendon around a shape counts: its code is as long as that of so many joints [–].

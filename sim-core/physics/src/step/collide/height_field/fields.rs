@@ -175,6 +175,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             hull_tables: &t.hulls,
             clip_tables: t.memory.cut,
             two_point_capsule_boxes: false,
+            ordered_corners: false,
         };
         // steps 2 and 3: the list of prisms
         let mut out = points_of::<C>(cx, t, p, center, origin);

@@ -74,6 +74,21 @@ pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>
     let x = b.axes[0] * half[0];
     let y = b.axes[1] * half[1];
     let z = b.axes[2] * half[2];
+    if pair.ordered_corners {
+        // all eight, x first; those above the centre are left out
+        for corner in 0..8 {
+            let along = |axis: Vec3<C::F>, bit: usize| match corner & bit {
+                0 => axis * C::F::c(-1.0),
+                _ => axis,
+            };
+            let corner = along(x, 1) + (along(y, 2) + along(z, 4));
+            let above = normal.dot(corner);
+            let far = C::F::c(0.0).lt(above);
+            let distance = C::F::select(far, pair.margin, height + above);
+            add_plane_contact(cx, pair, b.center + corner, distance, out);
+        }
+        return;
+    }
     for (y, z) in [
         (y, z),
         (y * C::F::c(-1.0), z),

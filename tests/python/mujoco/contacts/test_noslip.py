@@ -1,0 +1,133 @@
+"""Models with `noslip_iterations`: forces of friction, accelerations and motion are MuJoCo's."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+import pytest
+from live_model import live, relative
+
+import tightloop as tl
+from tightloop.errors import ArgumentError
+
+# what rests and slides on a plane, on another box and on a mesh, arms with dry friction that touch it, and a tendon
+XML = """<mujoco><option cone="{cone}" noslip_iterations="{sweeps}" noslip_tolerance="{tolerance}" impratio="{impratio}">
+  <flag island="{island}"/></option>
+<default><geom friction=".5 .02 .003" condim="{condim}"/></default>
+<asset><mesh name="wedge" vertex="-.2 -.15 -.1 .2 -.15 -.1 -.2 .15 -.1 .2 .15 -.1 -.1 0 .1 .15 .05 .08"/></asset>
+<worldbody><geom name="floor" type="plane" size="9 9 .1"/>
+  <body pos="0 0 .099"><freejoint name="slab"/><geom type="box" size=".3 .2 .1"/></body>
+  <body pos=".05 .02 .297"><freejoint name="lid"/><geom type="box" size=".15 .1 .1"/></body>
+  <body pos="2 0 .0985"><joint name="loose" type="free" frictionloss=".3"/><geom type="capsule" size=".1 .2"
+    euler="90 0 0"/></body>
+  <body pos="3 0 .5"><joint name="lift" axis="0 1 0" frictionloss=".4"/>
+    <geom type="capsule" size=".05" fromto="0 0 0 .3 0 0"/>
+    <body pos=".3 0 0"><joint name="elbow" axis="0 1 0" frictionloss=".2"/>
+      <geom type="capsule" size=".05" fromto="0 0 0 .3 0 -.46"/></body></body>
+  <body pos="4 0 .0985"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><geom size=".1"/></body>
+  <body pos="5 0 .0985"><freejoint/><geom type="mesh" mesh="wedge"/></body>
+  <body pos="6 0 .0985"><freejoint/><geom type="cylinder" size=".15 .1"/></body>
+  <body pos="7 0 .0985"><joint name="turn" type="ball" frictionloss=".1"/><geom type="ellipsoid" size=".1 .15 .1"/>
+  </body>
+</worldbody>
+<tendon><fixed name="both" frictionloss=".15"><joint joint="lift" coef="1"/><joint joint="elbow" coef="-.5"/></fixed>
+</tendon></mujoco>"""
+
+
+def model_of(cone="elliptic", condim=3, sweeps=5, tolerance=1e-6, impratio=1, island="enable") -> str:
+    return XML.format(cone=cone, condim=condim, sweeps=sweeps, tolerance=tolerance, impratio=impratio, island=island)
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+@pytest.mark.parametrize("condim", [1, 3, 4, 6])
+@pytest.mark.parametrize(
+    ("sweeps", "tolerance", "impratio", "island"),
+    [(1, 0, 1, "enable"), (5, 1e-6, 10, "enable"), (8, 1e-3, 1, "enable"), (4, 1e-5, 1, "disable")],
+)
+def test_accelerations_and_motion_are_mujocos(cone, condim, sweeps, tolerance, impratio, island):
+    xml = model_of(cone, condim, sweeps, tolerance, impratio, island)
+    with live(xml, worlds=6, fields=("qfrc_constraint",)) as case:
+        states = case.states(3, spread=0.004, speed=0.3)
+        frame = case.place(states)
+        own = list(case.data(states))
+        for world, data in enumerate(own):
+            mujoco.mj_forward(case.model, data)
+            assert data.ncon >= 10
+            assert relative(frame.qfrc_constraint[world], data.qfrc_constraint) < 1e-8, world
+            assert relative(frame.qacc[world], data.qacc) < 1e-8, world
+        for step in range(100):
+            frame = case.sim.step()
+            for data in own:
+                mujoco.mj_step(case.model, data)
+            for world, data in enumerate(own):
+                assert relative(frame.qpos[world], data.qpos) < 1e-6, (step, world)
+        assert not frame.status.any()
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+@pytest.mark.parametrize("condim", [3, 6])
+def test_single_precision_is_double_s(cone, condim):
+    worlds = 21
+    found = []
+    for precision in ("f64", "f32"):
+        with live(model_of(cone, condim), worlds=worlds, precision=precision) as case:
+            frame = case.place(case.states(5, spread=0.004, speed=0.3))
+            found.append(frame.qacc.astype(float))
+            for _ in range(20):
+                frame = case.sim.step()
+            found.append(frame.qpos.astype(float))
+            assert not frame.status.any()
+    for world in range(worlds):
+        assert relative(found[2][world], found[0][world]) < 1e-3, world
+        assert relative(found[3][world], found[1][world]) < 1e-3, world
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_a_world_alone_has_the_bits_of_the_same_world_among_others(cone):
+    with live(model_of(cone, 4), worlds=19, precision="f32") as case:
+        states = case.states(7, spread=0.01, speed=0.3)
+        case.place(states)
+        for _ in range(30):
+            among = case.sim.step()
+        among = among.qpos.copy()
+    for world in (0, 11, 18):
+        with live(model_of(cone, 4), worlds=1, precision="f32") as case:
+            case.place(type(states)(**{name: values[world : world + 1] for name, values in vars(states).items()}))
+            for _ in range(30):
+                alone = case.sim.step()
+            np.testing.assert_array_equal(alone.qpos[0], among[world])
+
+
+def test_a_box_on_a_slope_creeps_no_more():
+    slope = """<mujoco><option gravity="3 0 -9.3" noslip_iterations="{sweeps}" cone="elliptic"/><worldbody>
+      <geom type="plane" size="9 9 .1"/><body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+      </worldbody></mujoco>"""
+    crept = []
+    for sweeps in (0, 10, 30):
+        with live(slope.format(sweeps=sweeps), worlds=1) as case:
+            for _ in range(1000):
+                before = case.sim.step().qpos[0, 0]
+            for _ in range(1000):
+                after = case.sim.step().qpos[0, 0]
+            crept.append(after - before)
+    assert crept[0] > 1e-3
+    assert all(0.01 * more > less for more, less in pairwise(crept[:2])) and abs(crept[2]) < 1e-6
+
+
+def test_a_gpu_refuses_and_a_model_without_sweeps_runs():
+    xml = model_of()
+    model = mujoco.MjModel.from_xml_string(xml)
+    with pytest.raises(ArgumentError, match="noslip_iterations"):
+        tl.launch(tl.Scene.from_mujoco(model), worlds=1, device="gpu")
+    plain = mujoco.MjModel.from_xml_string(model_of(sweeps=0))
+    scene = tl.Scene.from_mujoco(model, without=("noslip_iterations",))
+    (read,) = scene.models.values()
+    assert any("slip a little" in note for note in read.notes)
+    data = mujoco.MjData(plain)
+    with tl.launch(scene, worlds=1, precision="f64", fields=("qpos",)) as sim:
+        for _ in range(50):
+            frame = sim.step()
+            mujoco.mj_step(plain, data)
+        assert relative(frame.qpos[0], data.qpos) < 1e-6
