@@ -29,7 +29,7 @@ ROBOT = """
 <sensor><accelerometer name="imu" site="top"/><jointpos name="where" joint="x"/></sensor>
 <keyframe><key name="home" qpos="0.5 0.1"/></keyframe></mujoco>"""
 ROBOT = HEAD + ROBOT.lstrip()
-ADHESION = ROBOT.replace("<actuator>", '<actuator><adhesion name="pad" body="cart" ctrlrange="0 1"/>')
+REFUSED = ROBOT.replace("<actuator>", '<actuator><general name="pad" body="cart" biastype="affine" biasprm="0 0 -1"/>')
 
 
 @pytest.fixture(autouse=True)
@@ -95,7 +95,7 @@ def test_json_has_the_same_facts(tmp_path):
 
 def test_everything_that_is_refused_is_named(tmp_path):
     legs = "".join(f'<geom name="egg{k}" size=".1" condim="1" solimp=".9 .95 .001 .5 99"/>' for k in range(9))
-    path = file_of(tmp_path, ADHESION.replace('<site name="top"/>', f'<site name="top"/>{legs}'))
+    path = file_of(tmp_path, REFUSED.replace('<site name="top"/>', f'<site name="top"/>{legs}'))
     done = inspected(tmp_path, path)
     assert done.returncode == 1
     for name in (*(f"geom `egg{k}`" for k in range(9)), "actuator `pad`"):

@@ -8,8 +8,8 @@ use crate::description::{self, ActuatorActivation, ActuatorLength, Precompiled};
 use crate::pose::Pose;
 use sim_physics::constants::Body;
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, Actuators, LengthKind, Sites, SliderCrank, TendonBound,
-    TurningLength,
+    Activation, ActivationRate, Actuator, Actuators, Adhesion, LengthKind, Sites, SliderCrank,
+    TendonBound, TurningLength,
 };
 use sim_physics::constants::lengths::Term;
 use sim_physics::constants::site::Mount;
@@ -21,11 +21,19 @@ pub(super) struct Scene<'a> {
     /// An entry for each of its links.
     pub carriers: &'a [Carrier],
     pub bodies: &'a [Body<f64>],
+    /// Its first body among those of MuJoCo models.
+    pub first_body: usize,
     pub dt: f64,
 }
 
 /// Adds an actuator to those before it.
 pub(super) fn add(to: &mut Actuators<f64>, actuator: &description::Actuator, scene: &Scene<'_>) {
+    if let ActuatorLength::Contacts { link } = actuator.length {
+        to.adhesions.push(Adhesion {
+            actuator: to.all.len(),
+            body: scene.first_body + link,
+        });
+    }
     let (terms, turning) = length(&actuator.length, scene, moments(to));
     let activation = actuator.activation.map(|described| {
         let place = to.activations;
@@ -156,6 +164,8 @@ fn length(length: &ActuatorLength, scene: &Scene<'_>, first: usize) -> Length {
             let dofs = dofs_between(scene, site.body, other);
             turning(LengthKind::Site(Sites { site, reference }), *gear, dofs)
         }
+        // these have moments once contacts are known
+        ActuatorLength::Contacts { .. } => return (Vec::new(), None),
     };
     (Vec::new(), Some(turning))
 }

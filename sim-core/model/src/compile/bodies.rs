@@ -376,6 +376,7 @@ impl BodyBuilder {
                 lengths,
                 carriers,
                 bodies: &self.bodies,
+                first_body,
                 dt: self.dt,
             };
             actuators::add(&mut self.actuators, actuator, &scene);

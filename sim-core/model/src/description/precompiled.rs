@@ -210,6 +210,11 @@ pub enum ActuatorLength {
         /// Force, then torque.
         gear: [f64; 6],
     },
+    /// The contacts of a link, to which it is pulled.
+    Contacts {
+        /// The link.
+        link: usize,
+    },
 }
 
 /// The state of an actuator.

@@ -3,8 +3,8 @@
 //! The first release kept these constants together, for models from MuJoCo alone.
 
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, LengthKind, Muscle, MuscleRate,
-    Sites, SliderCrank, TendonBound, TurningLength,
+    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, Adhesion, LengthKind, Muscle,
+    MuscleRate, Sites, SliderCrank, TendonBound, TurningLength,
 };
 use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
 use sim_physics::constants::lengths::{Length, Term};
@@ -41,6 +41,7 @@ pub(super) struct Additions<'a> {
     mocaps: usize,
     dof_bounds: &'a Vec<ActuatorBound<f64>>,
     tendon_bounds: &'a Vec<TendonBound<f64>>,
+    adhesions: &'a Vec<Adhesion>,
     impedances: &'a Vec<Impedance<f64>>,
     pair_impedance: &'a Fixed,
     class_impedances: &'a Vec<Vec<usize>>,
@@ -105,6 +106,7 @@ impl Additions<'_> {
                     damped: _,
                     dof_bounds,
                     tendon_bounds,
+                    adhesions,
                 },
             mocaps,
             outputs,
@@ -138,6 +140,7 @@ impl Additions<'_> {
             mocaps: *mocaps,
             dof_bounds,
             tendon_bounds,
+            adhesions,
             impedances,
             pair_impedance,
             class_impedances,
@@ -177,7 +180,8 @@ view! {
             "pair_bodies": pair_bodies,
             "class_bodies": class_bodies,
         }
-        Later { "spatial_tendons": spatial_tendons };
+        Later { "spatial_tendons": spatial_tendons }
+        Later { "adhesions": adhesions };
     Spring<f64> as "Spring":
         Always { "dof": dof, "stiffness": stiffness, "rest": rest };
     PoseSpring<f64> as "PoseSpring":
@@ -240,6 +244,8 @@ view! {
         Always { "dof": dof, "range": range };
     TendonBound<f64> as "TendonBound":
         Always { "actuators": actuators, "range": range };
+    Adhesion as "Adhesion":
+        Always { "actuator": actuator, "body": body };
     Activation<f64> as "Activation":
         Always {
             "place": place,

@@ -1,5 +1,6 @@
 //! What a model has that the physics does not: each by the name of its element.
 
+use super::actuators::laws;
 use super::actuators::muscles::Muscles;
 use super::format::ModelFile;
 use super::names::names;
@@ -91,6 +92,7 @@ pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     equalities(file, &mut refused)?;
     tendons(file, &mut refused)?;
     actuators(file, &mut refused)?;
+    adhesions(file, &mut refused)?;
     Ok(refused)
 }
 
@@ -296,8 +298,8 @@ fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
             | "mjTRN_JOINTINPARENT"
             | "mjTRN_TENDON"
             | "mjTRN_SITE"
-            | "mjTRN_SLIDERCRANK" => None,
-            "mjTRN_BODY" => Some("a body (adhesion)"),
+            | "mjTRN_SLIDERCRANK"
+            | "mjTRN_BODY" => None,
             other => Some(other),
         };
         let law = match (dynamics[k].as_str(), gains[k].as_str(), biases[k].as_str()) {
@@ -317,6 +319,30 @@ fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
             let several = "several controls, outputs or activations";
             refused.push(no("actuator", name, several));
         }
+    }
+    Ok(())
+}
+
+/// What actuators that pull a body to its contacts cannot do.
+fn adhesions(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
+    let count = file.rows("actuator_trntype");
+    let names = names(file, "actuator", count)?;
+    let transmissions = file.kinds("actuator_trntype", count)?;
+    let targets = file.vectors_of_integers::<2>("actuator_trnid", count)?;
+    let laws = [laws(file, "gain", count)?, laws(file, "bias", count)?];
+    for k in (0..count).filter(|&k| transmissions[k] == "mjTRN_BODY") {
+        // how fast contacts part is known after the forces
+        let follows = laws
+            .iter()
+            .any(|(kinds, factors)| kinds[k].ends_with("_AFFINE") && factors[k][2] != 0.0);
+        let is_muscle = laws.iter().any(|(kinds, _)| kinds[k].ends_with("_MUSCLE"));
+        let wrong = [
+            (targets[k][0] == 0, "adhesion of the world"),
+            (follows, "adhesion by a force that depends on velocity"),
+            (is_muscle, "adhesion by a muscle"),
+        ];
+        let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
+        refused.extend(wrong.map(|(_, what)| no("actuator", &names[k], what)));
     }
     Ok(())
 }

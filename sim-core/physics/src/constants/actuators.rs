@@ -1,7 +1,7 @@
 //! Actuators: forces along lengths that a control and an activation drive.
 
 use super::lengths::Term;
-use super::recast::{Recast, recast};
+use super::recast::{Recast, recast, same};
 use super::site::Mount;
 use crate::lane::Real;
 
@@ -19,6 +19,8 @@ recast! {
         pub dof_bounds: Vec<ActuatorBound<R>>,
         /// Bounds of the sum of actuator forces along a tendon.
         pub tendon_bounds: Vec<TendonBound<R>>,
+        /// Those that pull a body to what it touches.
+        pub adhesions: Vec<Adhesion>,
     }
 }
 
@@ -30,6 +32,7 @@ impl<R> Default for Actuators<R> {
             damped: Vec::new(),
             dof_bounds: Vec::new(),
             tendon_bounds: Vec::new(),
+            adhesions: Vec::new(),
         }
     }
 }
@@ -118,6 +121,17 @@ recast! {
         pub range: [R; 2],
     }
 }
+
+/// An actuator that pulls a body to what it touches (MuJoCo: `actuator/adhesion`). It has no terms and no turning length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adhesion {
+    /// The actuator.
+    pub actuator: usize,
+    /// The body, among those of MuJoCo models.
+    pub body: usize,
+}
+
+same! { Adhesion }
 
 recast! {
     /// The state of an actuator (MuJoCo: `actuator_dyntype`).

@@ -76,6 +76,8 @@ macro_rules! every_stage {
             ellipsoid_hull       [collide::EllipsoidHull]                    Both;
             hull_hull            [collide::HullHull]                         Both;
             contact_rows         [constraints::contact_rows::ContactRows]    Both;
+            // the forces along contacts, which ends those of actuators
+            adhesion             [forces::adhesion::Adhesion]                Both;
             // accelerations and constraint forces, then the next state
             solver               [solver::Solver::<false>]                   Both;
             solver_turning       [solver::Solver::<true>]                    Both;

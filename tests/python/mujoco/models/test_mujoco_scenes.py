@@ -172,8 +172,8 @@ def test_commands_are_checked(model):
         (
             '<worldbody><body name="b"><joint name="j" range="-9 9"/>'
             '<geom name="g" size=".1" fluidshape="ellipsoid"/></body></worldbody>'
-            '<actuator><adhesion name="m" body="b" ctrlrange="0 1"/></actuator>',
-            ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for transmission to"],
+            '<actuator><general name="m" body="b" biastype="affine" biasprm="0 0 -1"/></actuator>',
+            ["geom `g`: no support for the ellipsoid fluid model", "actuator `m`: no support for adhesion by a force"],
         ),
         (
             '<worldbody><geom name="f" type="plane" size="1 1 1"/>'

@@ -62,10 +62,10 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     Ok(())
 }
 
-type Laws = (Vec<String>, Vec<[f64; 3]>);
+pub(super) type Laws = (Vec<String>, Vec<[f64; 3]>);
 
 /// Kinds of gains or biases, and their first three parameters.
-fn laws(file: &ModelFile, which: &str, count: usize) -> Result<Laws, ModelError> {
+pub(super) fn laws(file: &ModelFile, which: &str, count: usize) -> Result<Laws, ModelError> {
     let kinds = file.kinds(&format!("actuator_{which}type"), count)?;
     let parameters = file.vectors::<10>(&format!("actuator_{which}prm"), count)?;
     let parameters = parameters.into_iter().map(|[a, b, c, ..]| [a, b, c]);

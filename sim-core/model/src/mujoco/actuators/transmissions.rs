@@ -1,4 +1,4 @@
-//! What actuators of a model act on: joints, tendons, sites.
+//! What actuators of a model act on: joints, tendons, sites, contacts of bodies.
 
 use crate::description::{ActuatorLength, JointKind, Length, Robot};
 use crate::error::ModelError;
@@ -18,6 +18,8 @@ pub(super) struct Transmissions<'a> {
     tendons: Tendons,
     /// Link and frame of each site.
     sites: Vec<(usize, Pose)>,
+    /// How many links there are.
+    links: usize,
     /// Lengths of the rods of slider-cranks; empty where a file has none [m].
     rods: Vec<f64>,
 }
@@ -48,6 +50,7 @@ impl<'a> Transmissions<'a> {
             gears: file.vectors::<6>("actuator_gear", count)?,
             joints: joints.collect(),
             tendons: Tendons::read(file, robot)?,
+            links: robot.links.len(),
             sites: sites.collect::<Result<_, ModelError>>()?,
             rods: match kinds.iter().any(|kind| kind == "mjTRN_SLIDERCRANK") {
                 true => file.reals("actuator_cranklength", count)?,
@@ -85,6 +88,10 @@ impl<'a> Transmissions<'a> {
                     gear: gear[0],
                 },
             }),
+            "mjTRN_BODY" => match place < self.links {
+                true => Ok(ActuatorLength::Contacts { link: place }),
+                false => Err(fault()),
+            },
             "mjTRN_SLIDERCRANK" => Ok(ActuatorLength::SliderCrank {
                 crank: self.sites.get(place).cloned().ok_or_else(fault)?,
                 slider: self.site(other).cloned().ok_or_else(fault)?,

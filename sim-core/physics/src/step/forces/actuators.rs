@@ -12,7 +12,7 @@
 
 use super::muscles;
 use super::transmission::measure;
-use crate::arrays::Array as A;
+use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::actuators::{Activation, ActivationRate};
 use crate::constants::actuators::{Actuator, TendonBound};
@@ -97,20 +97,28 @@ impl Stage for Actuators {
                 }
             }
         }
-        // gravity compensation that counts as an actuator, so that the bounds below hold for it, too
-        for &dof in &m.compensation.actuated_dofs {
-            let joint = &mut b.work.qfrc_actuator[dof];
-            *joint = *joint + b.work.qfrc_gravcomp[dof];
+        // where contacts have moments, too, the sum ends once they are known
+        if m.actuators.adhesions.is_empty() {
+            end_sum(m, &mut b.work);
         }
-        // clamp of the sum on a dof (MuJoCo: `actuatorfrcrange`)
-        for bound in &m.actuators.dof_bounds {
-            let joint = &mut b.work.qfrc_actuator[bound.dof];
-            *joint = bounded(*joint, Some(bound.range));
-        }
-        // smooth += Jᵀ force
-        for (smooth, joint) in b.work.smooth_force.iter_mut().zip(&b.work.qfrc_actuator) {
-            *smooth = *smooth + *joint;
-        }
+    }
+}
+
+/// Ends the sum of actuator forces, and adds it to the smooth forces.
+#[inline(always)]
+pub(super) fn end_sum<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<F>) {
+    // gravity compensation that counts as an actuator, so that the bounds below hold for it, too
+    for &dof in &m.compensation.actuated_dofs {
+        w.qfrc_actuator[dof] = w.qfrc_actuator[dof] + w.qfrc_gravcomp[dof];
+    }
+    // clamp of the sum on a dof (MuJoCo: `actuatorfrcrange`)
+    for bound in &m.actuators.dof_bounds {
+        let joint = &mut w.qfrc_actuator[bound.dof];
+        *joint = bounded(*joint, Some(bound.range));
+    }
+    // smooth += Jᵀ force
+    for (smooth, joint) in w.smooth_force.iter_mut().zip(&w.qfrc_actuator) {
+        *smooth = *smooth + *joint;
     }
 }
 

@@ -5,6 +5,7 @@
 //! | `command` | commands of this substep: delay and noise |
 //! | `actuation` | drives: PD gains and effort limits |
 //! | `actuators`, `transmission` | actuators: activation, gain, bias, and the lengths along which they act |
+//! | `adhesion` | actuators that pull bodies to what they touch |
 //! | `damping` | damping of actuators and tendons in an implicit step |
 //! | `muscles` | gain, bias and activation of muscles |
 //! | `springs` | springs and dampers of joints and tendons |
@@ -14,6 +15,7 @@
 
 pub mod actuation;
 pub mod actuators;
+pub mod adhesion;
 pub mod command;
 pub mod damping;
 pub mod fluid;
