@@ -117,6 +117,10 @@ class Frame:
     nothing."""
     geom_xmat: NDArray[Any]
     """Orientation of each geom of MuJoCo models in the world, a matrix row by row, ``(worlds, ngeom, 9)``."""
+    ten_length: NDArray[Any]
+    """Length of each tendon of MuJoCo models [rad or m], ``(worlds, ntendon)``, also of tendons that nothing uses."""
+    ten_velocity: NDArray[Any]
+    """Rate of change of the length of each tendon of MuJoCo models [rad/s or m/s], ``(worlds, ntendon)``."""
     subtree_com: NDArray[Any]
     """Centre of mass of each body of MuJoCo models with all bodies below it, in the world [m],
     ``(worlds, nbody, 3)``."""

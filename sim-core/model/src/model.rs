@@ -43,6 +43,7 @@ pub struct Model {
     pub(crate) refused_sensors: Vec<String>,
     pub(crate) site_names: Vec<String>,
     pub(crate) output_site_names: Vec<String>,
+    pub(crate) output_tendon_names: Vec<String>,
     pub(crate) contact_sensors: Vec<SensedShapes>,
     pub(crate) command_delay_max: usize,
     pub(crate) robots: Vec<RobotRange>,
@@ -144,6 +145,7 @@ impl Model {
             Axis::Mocaps => self.mocap_names.clone(),
             Axis::Equalities => self.equality_names.clone(),
             Axis::OutputSites => self.output_site_names.clone(),
+            Axis::OutputTendons => self.output_tendon_names.clone(),
             Axis::Size(3) => ["x", "y", "z"].map(str::to_owned).to_vec(),
             Axis::Size(n) => (0..n).map(|k| k.to_string()).collect(),
             Axis::Rows
@@ -246,6 +248,7 @@ impl Model {
             output_bodies: self.constants.outputs.bodies.len(),
             output_sites: self.constants.outputs.sites.len(),
             output_geoms: self.constants.outputs.geoms.len(),
+            output_tendons: self.constants.outputs.tendons.len(),
             sensordata: self.constants.sensors.scalars,
         }
     }

@@ -46,8 +46,8 @@ impl MujocoTable {
     }
 }
 
-/// What a client wants to know of an exported model: the keys of [`robot_summary`], names of actuators, sites, geoms and sensors,
-/// and `options` with the keys of a scene.
+/// What a client wants to know of an exported model: the keys of [`robot_summary`], names of actuators, sites, geoms, tendons and
+/// sensors, and `options` with the keys of a scene.
 ///
 /// # Errors
 /// What is wrong with the file, or not supported, by name.
@@ -69,6 +69,7 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
         let sensors = parts.sensors.all.iter().map(|sensor| &sensor.name);
         summary["site_names"] = json!(parts.frames.site_names);
         summary["geom_names"] = json!(parts.frames.geom_names);
+        summary["tendon_names"] = json!(parts.frames.tendon_names);
         summary["sensor_names"] = sensors.map(|name| json!(name)).collect();
     }
     let integrator = robot.precompiled.as_ref().map(|parts| {

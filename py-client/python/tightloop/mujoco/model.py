@@ -75,6 +75,11 @@ class MujocoModel(Entity):
         return list(self._summary["geom_names"])
 
     @property
+    def tendon_names(self) -> list[str]:
+        """Names of the tendons, in the order of ``ten_length``."""
+        return list(self._summary["tendon_names"])
+
+    @property
     def sensor_names(self) -> list[str]:
         """Names of the sensors, in the order of ``sensordata``."""
         return list(self._summary["sensor_names"])

@@ -3,7 +3,7 @@
 use super::actuators;
 use super::carrier::Carrier;
 use super::constraint_rows::{DofJoint, SoftJoint};
-use super::output_frames::add_frames;
+use super::output_frames::{add_frames, add_tendon_lengths};
 use super::tendons::{Lengths, add_tendons};
 use super::ties::DofConstraint;
 use crate::description::{Description, Joint, JointExtras, Precompiled, Robot, TargetMode};
@@ -345,6 +345,7 @@ impl BodyBuilder {
             tendons: &self.tendons,
             first_tendon,
         };
+        add_tendon_lengths(&mut self.outputs, parts, &lengths, carriers, &self.bodies);
         for constraint in &parts.constraints {
             let compiled = DofConstraint::new(
                 constraint,

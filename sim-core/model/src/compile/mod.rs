@@ -34,7 +34,9 @@ use contacts::add_contacts;
 use contacts::pieces::{PlacedShape, Rules, placed_shapes};
 use contacts::sensors::add_contact_sensors;
 use inverse_weight::Reference;
-use precompiled::{check_models, output_site_names, sensors_of_centers, take_inverse_weights};
+use precompiled::{
+    check_models, output_site_names, output_tendon_names, sensors_of_centers, take_inverse_weights,
+};
 use sensors::finish_sensors;
 use sim_physics::constants::actuators::Actuators;
 use sim_physics::constants::contact::Contacts;
@@ -255,6 +257,7 @@ fn model(
         refused_sensors: [builder.refused_sensors, sensors_of_centers(scene)].concat(),
         site_names: scene.sites.iter().map(|site| site.name.clone()).collect(),
         output_site_names: output_site_names(scene),
+        output_tendon_names: output_tendon_names(scene),
         contact_sensors: scene.sensed_shapes()?,
         command_delay_max: scene.delay_max(),
         robots: builder.robots,

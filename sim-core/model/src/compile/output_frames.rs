@@ -1,9 +1,11 @@
-//! Frames of MuJoCo models on the bodies that carry them.
+//! Frames of MuJoCo models on the bodies that carry them, and their tendons.
 
 use super::carrier::Carrier;
 use super::sites::mounted;
-use crate::description::{OnLink, Precompiled};
-use sim_physics::constants::outputs::{OutputBody, OutputFrames};
+use super::tendons::{Lengths, idle};
+use crate::description::{OnLink, Precompiled, TendonPart};
+use sim_physics::constants::Body;
+use sim_physics::constants::outputs::{OutputBody, OutputFrames, OutputTendon};
 use sim_physics::constants::site::Mount;
 
 /// Adds the frames of a model. `carriers` has an entry for each of its links, `first_link` is the number of the first.
@@ -38,6 +40,27 @@ pub(super) fn add_frames(
     }
     frames.sites.extend(parts.frames.sites.iter().map(mount));
     frames.geoms.extend(parts.frames.geoms.iter().map(mount));
+}
+
+/// Adds the tendons of a model, which `lengths` has the used ones of.
+pub(super) fn add_tendon_lengths(
+    frames: &mut OutputFrames<f64>,
+    parts: &Precompiled,
+    lengths: &Lengths<'_>,
+    carriers: &[Carrier],
+    bodies: &[Body<f64>],
+) {
+    let tendons = parts.frames.tendons.iter().map(|tendon| match tendon {
+        TendonPart::Used(length) => OutputTendon {
+            length: lengths.length(length),
+            idle: None,
+        },
+        TendonPart::Idle(tendon) => OutputTendon {
+            length: Vec::new().into(),
+            idle: Some(idle(tendon, carriers, bodies)),
+        },
+    });
+    frames.tendons.extend(tendons);
 }
 
 /// A frame on a link as the kernel source reads it.

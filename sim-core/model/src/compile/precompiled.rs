@@ -70,6 +70,17 @@ pub(super) fn output_site_names(scene: &Description) -> Vec<String> {
     sites.collect()
 }
 
+/// Names of the tendons of MuJoCo models, in the order of their lengths.
+pub(super) fn output_tendon_names(scene: &Description) -> Vec<String> {
+    let robots = scene.robots.iter();
+    let tendons = robots.flat_map(|robot| {
+        let parts = robot.precompiled.iter();
+        let names = parts.flat_map(|parts| &parts.frames.tendon_names);
+        names.map(|name| format!("{}/{name}", robot.name))
+    });
+    tendons.collect()
+}
+
 /// Refuses models from MuJoCo that do not fit together, or that a parameter would change in silence.
 pub(super) fn check_models(scene: &Description) -> Result<(), ModelError> {
     let models = scene

@@ -76,6 +76,15 @@ pub(super) fn add_tendons(
     }
 }
 
+/// A spatial tendon that a step does without.
+pub(super) fn idle(
+    tendon: &description::SpatialTendon,
+    carriers: &[Carrier],
+    bodies: &[Body<f64>],
+) -> SpatialTendon<f64> {
+    spatial(tendon, carriers, bodies, 0)
+}
+
 fn spatial(
     tendon: &description::SpatialTendon,
     carriers: &[Carrier],

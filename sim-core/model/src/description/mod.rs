@@ -36,4 +36,4 @@ pub use sensors::{
     ZoneKind, ZonePart,
 };
 pub(crate) use shapes::named;
-pub use tendons::{Length, Span, SpatialTendon, Wrap};
+pub use tendons::{Length, Span, SpatialTendon, TendonPart, Wrap};

@@ -1,8 +1,9 @@
-//! Frames of a robot that MuJoCo compiled, in MuJoCo's order: what outputs show of it and physics does not need.
+//! Frames and tendons of a robot that MuJoCo compiled, in MuJoCo's order: what outputs show of it and physics does not need.
 
+use super::tendons::TendonPart;
 use crate::pose::Pose;
 
-/// Frames of links, sites and geoms.
+/// Frames of links, sites and geoms, and tendons.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameParts {
     /// Inertia of each link, as MuJoCo has it.
@@ -17,6 +18,10 @@ pub struct FrameParts {
     pub site_names: Vec<String>,
     /// Names of the geoms.
     pub geom_names: Vec<String>,
+    /// Tendons.
+    pub tendons: Vec<TendonPart>,
+    /// Names of the tendons.
+    pub tendon_names: Vec<String>,
 }
 
 /// A frame on a link.

@@ -11,6 +11,15 @@ pub enum Length {
     Spatial(usize),
 }
 
+/// A tendon as outputs show it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TendonPart {
+    /// One that is fixed, or that something uses.
+    Used(Length),
+    /// A spatial tendon that nothing uses.
+    Idle(SpatialTendon),
+}
+
 /// A spatial tendon, as [`sim_physics::constants::tendons::SpatialTendon`] has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpatialTendon {

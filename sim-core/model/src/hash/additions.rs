@@ -282,7 +282,8 @@ view! {
             "bodies": bodies,
         };
     OutputFrames<f64> as "MujocoFrames":
-        Always { "bodies": bodies, "sites": sites, "geoms": geoms };
+        Always { "bodies": bodies, "sites": sites, "geoms": geoms }
+        => tendons;
     OutputBody<f64> as "MujocoBody":
         Always {
             "link": link,

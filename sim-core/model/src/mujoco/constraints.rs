@@ -33,6 +33,8 @@ pub(super) fn add_constraints(
     }
     add_springs(file, &tendons, parts)?;
     parts.spatial_tendons = tendons.spatial;
+    parts.frames.tendons = tendons.all;
+    parts.frames.tendon_names = tendons.names;
     Ok(())
 }
 

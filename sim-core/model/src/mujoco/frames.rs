@@ -24,6 +24,9 @@ pub(super) fn frames(file: &ModelFile, bodies: usize) -> Result<FrameParts, Mode
         collisions: vec![None; file.rows("geom_bodyid")],
         site_names: all_names(file, "site")?,
         geom_names: all_names(file, "geom")?,
+        // once joints are known
+        tendons: Vec::new(),
+        tendon_names: Vec::new(),
     })
 }
 

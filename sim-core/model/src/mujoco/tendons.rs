@@ -3,7 +3,7 @@
 use super::format::ModelFile;
 use super::frames::on_links;
 use super::names::names;
-use crate::description::{Length, OnLink, Robot, Span, SpatialTendon, Wrap};
+use crate::description::{Length, OnLink, Robot, Span, SpatialTendon, TendonPart, Wrap};
 use crate::error::ModelError;
 
 /// Smallest radius and smallest divisor of MuJoCo (`mjMINVAL`) [m, –].
@@ -13,8 +13,8 @@ const TINY: f64 = 1e-15;
 pub(super) struct Tendons {
     /// Their names.
     pub names: Vec<String>,
-    /// Their lengths; none of a spatial tendon that nothing uses.
-    lengths: Vec<Option<Length>>,
+    /// All of them.
+    pub all: Vec<TendonPart>,
     /// The spatial ones that are used.
     pub spatial: Vec<SpatialTendon>,
 }
@@ -26,25 +26,27 @@ impl Tendons {
         let paths = Paths::read(file, robot)?;
         let mut tendons = Tendons {
             names: names(file, "tendon", count)?,
-            lengths: Vec::new(),
+            all: Vec::new(),
             spatial: Vec::new(),
         };
         let (is_spatial, is_used) = (spatial_tendons(file)?, used(file, count)?);
         for k in 0..count {
-            let length = match (is_spatial[k], is_used[k]) {
-                (false, _) => {
-                    let terms = paths.joints(k);
-                    Some(Length::Joints(terms.ok_or_else(|| tendons.fault(file, k))?))
+            let part = if is_spatial[k] {
+                let spans = paths.spans(k);
+                let spans = spans.ok_or_else(|| tendons.fault(file, k))?;
+                let tendon = SpatialTendon { spans };
+                match is_used[k] {
+                    true => {
+                        tendons.spatial.push(tendon);
+                        TendonPart::Used(Length::Spatial(tendons.spatial.len() - 1))
+                    }
+                    false => TendonPart::Idle(tendon),
                 }
-                (true, false) => None,
-                (true, true) => {
-                    let spans = paths.spans(k);
-                    let spans = spans.ok_or_else(|| tendons.fault(file, k))?;
-                    tendons.spatial.push(SpatialTendon { spans });
-                    Some(Length::Spatial(tendons.spatial.len() - 1))
-                }
+            } else {
+                let terms = paths.joints(k);
+                TendonPart::Used(Length::Joints(terms.ok_or_else(|| tendons.fault(file, k))?))
             };
-            tendons.lengths.push(length);
+            tendons.all.push(part);
         }
         Ok(tendons)
     }
@@ -60,8 +62,10 @@ impl Tendons {
     /// No such tendon.
     pub fn length(&self, file: &ModelFile, tendon: i64) -> Result<&Length, ModelError> {
         let place = usize::try_from(tendon).ok();
-        let length = place.and_then(|place| self.lengths.get(place)?.as_ref());
-        length.ok_or_else(|| file.fault(format!("has no tendon {tendon}")))
+        match place.and_then(|place| self.all.get(place)) {
+            Some(TendonPart::Used(length)) => Ok(length),
+            _ => Err(file.fault(format!("has no tendon {tendon}"))),
+        }
     }
 }
 

@@ -121,6 +121,8 @@ pub enum Axis {
     OutputSites,
     /// Geoms of MuJoCo models.
     OutputGeoms,
+    /// Tendons of MuJoCo models.
+    OutputTendons,
     /// Scalars of the sensors of MuJoCo models.
     Sensordata,
     /// A fixed length.
@@ -148,6 +150,7 @@ impl Axis {
             Axis::OutputBodies => sizes.output_bodies,
             Axis::OutputSites => sizes.output_sites,
             Axis::OutputGeoms => sizes.output_geoms,
+            Axis::OutputTendons => sizes.output_tendons,
             Axis::Sensordata => sizes.sensordata,
             Axis::Size(n) => n,
         }
@@ -173,6 +176,7 @@ impl Axis {
             Axis::OutputBodies => "nbody".into(),
             Axis::OutputSites => "nsite".into(),
             Axis::OutputGeoms => "ngeom".into(),
+            Axis::OutputTendons => "ntendon".into(),
             Axis::Sensordata => "nsensordata".into(),
             Axis::Size(n) => n.to_string(),
         }

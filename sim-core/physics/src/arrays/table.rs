@@ -234,6 +234,11 @@ arrays! { m;
             => "geom_xpos" [OutputGeoms, Size(3)], "Centre of each geom of MuJoCo models in the world, also of geoms that touch nothing.";
         geom_xmat: GeomXmat [MujocoMat; m.outputs.geoms.len()] Stage "–"
             => "geom_xmat" [OutputGeoms, Size(9)], "Orientation of each geom of MuJoCo models in the world, a matrix row by row.";
+        // all tendons of MuJoCo models, where `ten_length` has the spatial ones that something uses
+        tendon_length: TendonLength [Scalar; m.outputs.tendons.len()] Stage "rad or m"
+            => "ten_length" [OutputTendons], "Length of each tendon of MuJoCo models, also of tendons that nothing uses.";
+        tendon_velocity: TendonVelocity [Scalar; m.outputs.tendons.len()] Stage "rad/s or m/s"
+            => "ten_velocity" [OutputTendons], "Rate of change of the length of each tendon of MuJoCo models.";
         // from the reference point of the body's tree
         subtree_center: SubtreeCenter [Vec3; m.outputs.bodies.len()] Stage "m";
         subtree_mass: SubtreeMass [Scalar; m.outputs.bodies.len()] Stage "kg";

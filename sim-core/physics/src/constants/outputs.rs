@@ -1,10 +1,12 @@
 //! Frames that outputs are of: those of MuJoCo models in MuJoCo's order, model after model, also where no physics needs them.
 
+use super::lengths::Length;
 use super::recast::{Recast, recast};
 use super::site::Mount;
+use super::tendons::SpatialTendon;
 
 recast! {
-    /// Frames of bodies, sites and geoms; all empty for other models.
+    /// Frames of bodies, sites and geoms, and tendons; all empty for other models.
     #[derive(Clone, Debug)]
     pub struct OutputFrames<R> {
         /// Bodies, the world of each model first, parents before children.
@@ -13,6 +15,8 @@ recast! {
         pub sites: Vec<Mount<R>>,
         /// Geoms, also those that touch nothing.
         pub geoms: Vec<Mount<R>>,
+        /// Tendons.
+        pub tendons: Vec<OutputTendon<R>>,
     }
 }
 
@@ -22,6 +26,7 @@ impl<R> Default for OutputFrames<R> {
             bodies: Vec::new(),
             sites: Vec::new(),
             geoms: Vec::new(),
+            tendons: Vec::new(),
         }
     }
 }
@@ -44,5 +49,16 @@ recast! {
         pub mass: R,
         /// Principal moments of inertia [kg·m²].
         pub moments: [R; 3],
+    }
+}
+
+recast! {
+    /// A tendon of a MuJoCo model.
+    #[derive(Clone, Debug)]
+    pub struct OutputTendon<R> {
+        /// Its length; 0 of one that is idle.
+        pub length: Length<R>,
+        /// A spatial tendon that a step does without. It has no moments in `ten_moment`, so `first` means nothing.
+        pub idle: Option<SpatialTendon<R>>,
     }
 }

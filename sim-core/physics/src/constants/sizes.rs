@@ -37,6 +37,8 @@ pub struct Sizes {
     pub output_sites: usize,
     /// Geoms of MuJoCo models.
     pub output_geoms: usize,
+    /// Tendons of MuJoCo models.
+    pub output_tendons: usize,
     /// Scalars of the sensors of MuJoCo models.
     pub sensordata: usize,
 }

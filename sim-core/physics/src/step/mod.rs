@@ -104,6 +104,7 @@ macro_rules! every_stage {
             frames_of_bodies     [outputs::frames::Bodies]                   Evaluation;
             frames_of_sites      [outputs::frames::Sites]                    Evaluation;
             frames_of_geoms      [outputs::frames::Geoms]                    Evaluation;
+            lengths_of_tendons   [outputs::tendons::Lengths]                 Evaluation;
             subtrees             [outputs::subtrees::Subtrees]               Evaluation;
             inertias             [outputs::inertias::Inertias]               Evaluation;
             momenta              [outputs::momenta::Momenta]                 Evaluation;

@@ -7,6 +7,7 @@
 //! | `height_scan` | heights around a link |
 //! | `energy` | kinetic and potential energy |
 //! | `frames` | frames of bodies, sites and geoms of MuJoCo models |
+//! | `tendons` | lengths of tendons of MuJoCo models |
 //! | `subtrees`, `inertias`, `momenta`, `wrenches` | what MuJoCo computes of bodies and their subtrees |
 //! | `sensors` | `sensordata` |
 
@@ -20,5 +21,6 @@ pub mod sensors;
 pub mod site_inverse;
 pub mod sites;
 pub mod subtrees;
+pub mod tendons;
 pub mod velocities;
 pub mod wrenches;

@@ -48,24 +48,11 @@ impl Stage for Tendons {
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         for (k, tendon) in m.tendons.iter().enumerate() {
-            let zero = C::F::c(0.0);
-            for &body in &tendon.bodies {
-                b.work.force[body] = Spatial::zero();
-            }
-            // L, and the forces on bodies of a unit along it
-            let mut length = zero;
-            for span in &tendon.spans {
-                length = measure(cx, &mut b.work, span).fma(C::F::k(span.share), length);
-            }
-            b.work.ten_length[k] = length;
+            b.work.ten_length[k] = stretch(cx, &mut b.work, tendon);
             // moments, and L̇ = Σ moment q̇
-            let mut velocity = zero;
-            for (place, (&dof, moved)) in tendon.dofs.iter().zip(&tendon.moved).enumerate() {
-                let mut wrench = Spatial::zero();
-                for &body in moved {
-                    wrench = wrench + b.work.force[body];
-                }
-                let moment = b.work.motion[dof].dot(wrench);
+            let mut velocity = C::F::c(0.0);
+            for (place, &dof) in tendon.dofs.iter().enumerate() {
+                let moment = moment(&b.work, tendon, place);
                 b.work.ten_moment[tendon.first + place] = moment;
                 velocity = cx.get(&b.joint_qd[dof]).fma(moment, velocity);
             }
@@ -73,6 +60,39 @@ impl Stage for Tendons {
             b.work.ten_swing[k] = swing(m, &b.work, tendon);
         }
     }
+}
+
+/// L of a tendon, and in `force` those on its bodies of a unit along it.
+#[inline(always)]
+pub(in crate::step) fn stretch<C: Cx>(
+    cx: &mut C,
+    w: &mut Workspace<C::F>,
+    tendon: &SpatialTendon<<C::F as Num>::Real>,
+) -> C::F {
+    for &body in &tendon.bodies {
+        w.force[body] = Spatial::zero();
+    }
+    // L = Σ share · length of a piece
+    let mut length = C::F::c(0.0);
+    for span in &tendon.spans {
+        length = measure(cx, w, span).fma(C::F::k(span.share), length);
+    }
+    length
+}
+
+/// ∂L̇/∂q̇ of the dof at a place of a tendon's dofs, by the forces that [`stretch`] left.
+#[inline(always)]
+pub(in crate::step) fn moment<F: Num>(
+    w: &Workspace<F>,
+    tendon: &SpatialTendon<F::Real>,
+    place: usize,
+) -> F {
+    // S · Σ force of the bodies that the dof moves
+    let mut wrench = Spatial::zero();
+    for &body in &tendon.moved[place] {
+        wrench = wrench + w.force[body];
+    }
+    w.motion[tendon.dofs[place]].dot(wrench)
 }
 
 /// Adds the forces of a piece, and returns how long it is.
