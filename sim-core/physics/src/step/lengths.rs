@@ -20,6 +20,7 @@ pub(in crate::step) fn length<C: Cx>(
     b: &BlockOf<C>,
     of: &LengthOf<C>,
 ) -> C::F {
+    // Σ c q of joints, and L
     let mut length = C::F::c(0.0);
     for term in &of.terms {
         let q = cx.get(&b.joint_q[m.dofs[term.dof].coord]);
@@ -34,6 +35,7 @@ pub(in crate::step) fn length<C: Cx>(
 /// v
 #[inline(always)]
 pub(in crate::step) fn rate<C: Cx>(cx: &mut C, b: &BlockOf<C>, of: &LengthOf<C>) -> C::F {
+    // Σ c q̇ of joints, and L̇
     let mut rate = C::F::c(0.0);
     for term in &of.terms {
         let qd = cx.get(&b.joint_qd[term.dof]);

@@ -58,6 +58,7 @@ impl<F: Num> Factor<F> {
         // the determinant and the least pivot, of directions that exist
         let (mut determinant, mut least, mut count) = (one, one, zero);
         for i in 0..size {
+            // D(i) = P(i,i) + λ - Σ (L D)(i,k)² / D(k)
             let mut pivot = l[i][i] + shift;
             for k in 0..i {
                 pivot = (l[i][k] * l[i][k]).fnma(l[k][k], pivot);
@@ -69,6 +70,7 @@ impl<F: Num> Factor<F> {
             // 1/D; singular systems are not used
             let divisor = F::select(zero.lt(pivot), pivot, one);
             let inverse = one.div(divisor);
+            // (L D)(j,i) = P(j,i) - Σ (L D)(j,k) L(i,k)
             for j in i + 1..size {
                 let mut entry = l[j][i];
                 for k in 0..i {

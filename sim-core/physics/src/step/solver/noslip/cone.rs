@@ -69,6 +69,7 @@ pub(super) fn solve<C: Cx>(
         let has = zero.lt(problem.exists[i]);
         scaled.matrix[i][i] = C::F::select(has, scaled.matrix[i][i], one);
     }
+    // the least y in the ball; f = μ y
     let after = ball::least(cx, &scaled, normal);
     // a contact without a normal force has no friction
     let pushes = !normal.lt(C::F::c(NORMAL_MIN));
@@ -100,6 +101,7 @@ pub(super) fn solve<C: Cx>(
 pub(super) fn squares<C: Cx>(cx: &mut C, t: &ContactsOf<C>, class: &ClassOf<C>, r: C::I) -> C::F {
     let ratio = C::F::c(1.0 / t.impratio.to_f64());
     let normal = cx.load(t.memory.rows, r, row::FORCE);
+    // scaled forces: R f² is the same for all directions of friction
     let mut sum = C::F::c(0.0);
     for i in 0..directions(class) {
         let force = cx.load(

@@ -27,6 +27,7 @@ pub(super) fn sweep<C: Cx>(
         // J as a vector of all dofs, in `minimum`; the bound of the force
         let (loss, dof) = read_row::<C>(m, b, dry);
         let here = part.has::<C>(b, dof) & zero.lt(b.work.row_weight[dry.row]);
+        // rows of other parts, and those that do not act
         if !cx.anywhere(here) {
             continue;
         }
@@ -40,7 +41,7 @@ pub(super) fn sweep<C: Cx>(
             residual = w.minimum[j].fma(cx.get(&b.joint_qdd[j]), residual);
             diagonal = w.minimum[j].fma(w.step[j], diagonal);
         }
-        // the force of no residual, within its bounds
+        // the force of no residual, within its bounds: f⁺
         let force = cx.get(&b.efc_force[dry.row]);
         let free = force - residual.div(diagonal.max(C::F::c(DIAGONAL_MIN)));
         let bounded = free.max(-loss).min(loss);

@@ -97,6 +97,7 @@ fn sweep_islands<C: Cx>(
     if <<C::F as Num>::Real as Real>::DOUBLE
         && let Some(search) = m.prescribed_search()
     {
+        // which trees constraints couple
         let acting = Acting::find(cx, m, &b.work.row_weight);
         find(cx, m, search, b, acting);
         for first in search.islands_of(m.dofs.len()) {
@@ -108,6 +109,7 @@ fn sweep_islands<C: Cx>(
                     labels: &b.work.island,
                     label: C::F::c(first as f64),
                 };
+                // a gain is measured by tr M
                 let trace = trace(cx, m, &b.work, &island);
                 let least = trace * C::F::k(options.tolerance);
                 sweep_part(cx, m, b, options, Part(Some(first)), least);
@@ -143,6 +145,7 @@ fn factor<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         decompose(&m.pattern, &mut w.hessian);
         return;
     }
+    // τ + Jᵀ f; solving for a leaves the factor of M
     for j in 0..m.dofs.len() {
         w.start[j] = w.smooth_force[j] + cx.get(&b.constraint_force[j]);
     }
@@ -166,6 +169,7 @@ fn sweep_part<C: Cx>(
     let mut gain = cx.var(C::F::c(0.0));
     softness(cx, m, b, part, &mut gain);
     times!(cx, options.iterations, {
+        // joints and tendons, then contacts, each by the newest a
         dry::sweep(cx, m, b, (&options.dry_rows, part), &mut gain);
         rubbing::sweep(cx, m, b, part, &mut gain);
         let ends = cx.get(&gain).lt(least);
@@ -189,6 +193,7 @@ fn softness<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, part: Part, s
         let total = cx.get(sum) + C::F::select(counts, cost, zero);
         cx.set(sum, total);
     }
+    // contacts move dofs of one part alone, too
     for (k, class) in m.contacts.classes.iter().enumerate() {
         if let Some(column) = class.columns.first() {
             let here = part.has::<C>(b, column.dof);
@@ -202,6 +207,7 @@ fn softness<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, part: Part, s
 /// A dof that a row moves.
 #[inline(always)]
 fn first_dof<R: Real>(m: &Constants<R>, row: usize) -> usize {
+    // rows are in MuJoCo's order: equalities, frictions, limits, then ties
     let (equalities, joints) = (m.equalities.len(), m.joint_rows());
     let frictions = equalities + m.frictions.len();
     match row {

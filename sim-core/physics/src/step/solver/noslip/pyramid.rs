@@ -52,6 +52,7 @@ pub(super) fn solve<C: Cx>(
     let class = &t.classes[k];
     let mu = cx.load(t.memory.rows, r, row::MU);
     for i in 0..directions(class) {
+        // by the newest a: directions before this one have moved it
         write_step(cx, m, b, (k, r), i);
         let (slope, products) = slope_and_row(cx, m, b, (k, r), i);
         let diagonal = products[i];
@@ -68,6 +69,7 @@ pub(super) fn solve<C: Cx>(
             place(class, i, row::FORCE, turning::FORCE),
         );
         let moves = !(C::F::c(4.0) * mu * mu * diagonal).lt(C::F::c(DIAGONAL_MIN));
+        // f of no residual, clamped; 0 where the direction moves nothing
         let free = force - slope.div(C::F::select(moves, diagonal, C::F::c(1.0)));
         let next = C::F::select(moves, free.max(-bound).min(bound), zero);
         let change = (next - force) * exists(cx, t, class, r, i);
@@ -85,6 +87,7 @@ pub(super) fn solve<C: Cx>(
 pub(super) fn squares<C: Cx>(cx: &mut C, t: &ContactsOf<C>, class: &ClassOf<C>, r: C::I) -> C::F {
     let (zero, one, half) = (C::F::c(0.0), C::F::c(1.0), C::F::c(0.5));
     let mu = cx.load(t.memory.rows, r, row::MU);
+    // push₊ - push₋ = f / μ
     let rubs = zero.lt(mu);
     let inverse = one.div(C::F::select(rubs, mu, one));
     let mut total = zero;

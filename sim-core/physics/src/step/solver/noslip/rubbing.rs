@@ -33,6 +33,7 @@ pub(super) fn sweep<C: Cx>(
         cx.set(&mut rank, C::F::c(LAST));
         for k in 0..t.classes.len() {
             let list = class_list(cx, t, k);
+            // a contact of an earlier pair keeps what was found so far
             each!(cx, r in list, {
                 let other = rank_of(cx, m, r);
                 let least = cx.get(&rank).min(other);
@@ -41,6 +42,7 @@ pub(super) fn sweep<C: Cx>(
                 cx.set(&mut rank, best);
             });
         }
+        // no pair is left
         let ends = !cx.get(&rank).lt(C::F::c(LAST));
         break_if!(cx, ends);
         // its contacts
@@ -133,6 +135,7 @@ pub(super) fn write_step<C: Cx>(
     let w = &mut b.work;
     let step = &mut w.friction_steps[direction * n..(direction + 1) * n];
     step.fill(C::F::c(0.0));
+    // Jᵀ, of three rows per column in each block; then M⁻¹ Jᵀ by the factor of M
     for (c, column) in class.columns.iter().enumerate() {
         step[column.dof] = cx.load(m.contacts.memory.rows, r, at + 3 * c);
     }
@@ -151,6 +154,7 @@ pub(super) fn slope_and_row<C: Cx>(
     let (class, n, rows) = (&m.contacts.classes[k], m.dofs.len(), m.contacts.memory.rows);
     let aref = cx.load(rows, r, place(class, direction, row::AREF, turning::AREF));
     let at = place(class, direction, row::JACOBIAN, turning::JACOBIAN);
+    // column by column: J a - aref, and J times M⁻¹ Jᵀ
     let (mut slope, mut products) = (-aref, [C::F::c(0.0); 5]);
     for (c, column) in class.columns.iter().enumerate() {
         let entry = cx.load(rows, r, at + 3 * c);
@@ -173,14 +177,17 @@ pub(super) fn change_force<C: Cx>(
     change: C::F,
 ) {
     let (class, n, rows) = (&m.contacts.classes[k], m.dofs.len(), m.contacts.memory.rows);
+    // f
     let at = place(class, direction, row::FORCE, turning::FORCE);
     let force = cx.load(rows, r, at) + change;
     cx.store(rows, r, at, force);
+    // a += M⁻¹ Jᵀ Δf
     for j in 0..n {
         let step = b.work.friction_steps[direction * n + j];
         let a = change.fma(step, cx.get(&b.joint_qdd[j]));
         cx.set(&mut b.joint_qdd[j], a);
     }
+    // Jᵀ f += Jᵀ Δf
     let first = place(class, direction, row::JACOBIAN, turning::JACOBIAN);
     for (c, column) in class.columns.iter().enumerate() {
         let entry = cx.load(rows, r, first + 3 * c);
@@ -200,6 +207,7 @@ pub(super) fn gained<F: Num>(change: F, diagonal: F, slope: F) -> F {
 pub(super) fn softness<C: Cx>(cx: &mut C, t: &ContactsOf<C>, k: usize, sum: &mut C::V) {
     let class = &t.classes[k];
     let list = class_list(cx, t, k);
+    // f² over the ratios of R to that of the normal
     each!(cx, r in list, {
         let squares = match t.cone {
             Cone::Elliptic => cone::squares(cx, t, class, r),

@@ -54,6 +54,7 @@ pub(super) fn solve_again<C: Cx, const TURNS: bool>(
     if !cx.anywhere(is_stiff) {
         return;
     }
+    // the solution of the other worlds stays
     for (cell, value) in b.solution.iter_mut().zip(target.values(&mut b.work)) {
         cx.put(cell, *value);
     }
@@ -79,6 +80,7 @@ fn solve_by_factor<C: Cx, const TURNS: bool>(
     couples: bool,
 ) {
     let (t, w) = (&m.contacts, &mut b.work);
+    // the factor of M and the rows of joints, in cells, which loops over contacts change
     decompose(&m.pattern, &mut w.joint_system);
     gather(cx, &b.pull, &mut w.joint_force);
     cx.put_values(&w.joint_system, &mut b.system);
@@ -108,6 +110,7 @@ fn solve_by_factor<C: Cx, const TURNS: bool>(
             &b.coupled_system,
         ),
     };
+    // H⁻¹ of the right-hand side
     cx.get_values(factor, cells);
     substitute(pattern, factor, &mut w.joint_force);
 }
