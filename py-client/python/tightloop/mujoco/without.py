@@ -143,9 +143,9 @@ def _drop(found: Arrays, kind: str, dropped: NDArray[np.bool_]) -> None:
 
 
 def _geom(found: Arrays, place: int) -> list[str]:
-    _zero(found, place, "geom_contype", "geom_conaffinity", "geom_fluid", "geom_adhesion", "geom_surfacevel")
+    _zero(found, place, "geom_contype", "geom_conaffinity", "geom_adhesion", "geom_surfacevel")
     _drop(found, "pair", (found["pair_geom1"] == place) | (found["pair_geom2"] == place))
-    return ["touches nothing, and no fluid acts on it by a model of its own"]
+    return ["touches nothing"]
 
 
 def _joint(found: Arrays, place: int) -> list[str]:

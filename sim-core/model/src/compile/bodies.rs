@@ -14,7 +14,7 @@ use crate::pose::Pose;
 use sim_physics::constants::actuators::{ActuatorBound, Actuators};
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::params::Param;
-use sim_physics::constants::passive::{Drag, GravityCompensation};
+use sim_physics::constants::passive::{Drag, FluidGeom, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::Springs;
 use sim_physics::constants::tendons::SpatialTendon;
@@ -39,6 +39,7 @@ pub(super) struct BodyBuilder {
     pub springs: Springs<f64>,
     pub free_joints: Vec<usize>,
     pub drags: Vec<Drag<f64>>,
+    pub fluid_geoms: Vec<FluidGeom<f64>>,
     pub compensation: GravityCompensation<f64>,
     pub actuators: Actuators<f64>,
     pub switches: usize,
@@ -336,6 +337,7 @@ impl BodyBuilder {
         }
         self.add_compensations(robot, parts, carriers);
         self.add_drags(parts, carriers);
+        self.add_fluid_geoms(parts, carriers);
         let first_equality = self.switches;
         let first_tendon = self.tendons.len();
         let described = &parts.spatial_tendons;

@@ -153,6 +153,7 @@ fn bodies_alone(
         solved_bodies: Vec::new(),
         gyroscopic_bodies: Vec::new(),
         drags: Vec::new(),
+        fluid_geoms: Vec::new(),
         compensation: GravityCompensation::default(),
         ties: Vec::new(),
         tie_of_row: Vec::new(),
@@ -170,6 +171,7 @@ fn add_forces(m: &mut Constants<f64>, scene: &Description, builder: &mut BodyBui
     m.springs = std::mem::take(&mut builder.springs);
     m.free_joints = std::mem::take(&mut builder.free_joints);
     m.drags = std::mem::take(&mut builder.drags);
+    m.fluid_geoms = std::mem::take(&mut builder.fluid_geoms);
     m.compensation = std::mem::take(&mut builder.compensation);
     m.switches = builder.switches;
     m.actuators = std::mem::take(&mut builder.actuators);

@@ -3,14 +3,18 @@
 use super::bodies::{BodyBuilder, columns};
 use super::carrier::Carrier;
 use super::masses::massless;
-use crate::description::{Compensator, Description, Joint, JointExtras, Precompiled, Robot};
+use crate::description::{
+    Compensator, Description, EllipsoidInFluid, Joint, JointExtras, Precompiled, Robot,
+};
 use crate::joint_kind::JointKind;
+use crate::pose::Pose;
 use sim_physics::constants::actuators::Actuator;
 use sim_physics::constants::options::Integrator;
 use sim_physics::constants::params::Param;
-use sim_physics::constants::passive::{Compensation, Drag};
+use sim_physics::constants::passive::{Compensation, Drag, FluidGeom};
 use sim_physics::constants::springs::{PoseSpring, Spring};
 use sim_physics::constants::{Constants, Motion};
+use std::f64::consts::PI;
 use std::ops::Range;
 
 impl BodyBuilder {
@@ -47,11 +51,7 @@ impl BodyBuilder {
         for drag in &parts.drags {
             let carrier = &carriers[drag.link];
             let inertial = carrier.pose.mul(&drag.inertial);
-            // what has no dofs of its own does not move in the medium
-            let body = carrier
-                .body
-                .filter(|&body| !self.bodies[body].dofs().is_empty());
-            if let Some(body) = body {
+            if let Some(body) = self.moving(carrier) {
                 self.drags.push(Drag {
                     body,
                     center: inertial.pos,
@@ -62,6 +62,23 @@ impl BodyBuilder {
                 });
             }
         }
+    }
+
+    /// What the medium does to geoms.
+    pub(super) fn add_fluid_geoms(&mut self, parts: &Precompiled, carriers: &[Carrier]) {
+        for ellipsoid in &parts.ellipsoids_in_fluid {
+            let carrier = &carriers[ellipsoid.link];
+            if let Some(body) = self.moving(carrier) {
+                let geom = fluid_geom(body, &carrier.pose.mul(&ellipsoid.pose), ellipsoid);
+                self.fluid_geoms.push(geom);
+            }
+        }
+    }
+
+    /// The body of a link. What has no dofs of its own does not move in the medium.
+    fn moving(&self, carrier: &Carrier) -> Option<usize> {
+        let body = carrier.body;
+        body.filter(|&body| !self.bodies[body].dofs().is_empty())
     }
 
     /// Links that are held against gravity.
@@ -96,6 +113,60 @@ impl BodyBuilder {
                 center: carriers[link].pose.transform(inertial.pos),
             });
         }
+    }
+}
+
+/// Constants of a geom in a medium (MuJoCo documentation, "Computation: fluid forces, ellipsoid model").
+fn fluid_geom(body: usize, pose: &Pose, ellipsoid: &EllipsoidInFluid) -> FluidGeom<f64> {
+    let radii = ellipsoid.semi_axes;
+    let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+    // the two axes after each, and D(j) - D(k) of a diagonal matrix
+    let others = |i: usize| (radii[(i + 1) % 3], radii[(i + 2) % 3]);
+    let differences =
+        |d: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| d[(i + 1) % 3] - d[(i + 2) % 3]) };
+    let mut sorted = radii;
+    sorted.sort_by(f64::total_cmp);
+    let [_, middle, long] = sorted;
+    // volume, the sphere of the same mean radius, and the largest area across a flow
+    let volume = 4.0 / 3.0 * PI * radii.iter().product::<f64>();
+    let diameter = 2.0 / 3.0 * radii.iter().sum::<f64>();
+    let area = PI * long * middle;
+    // squared areas across the axes, over π²
+    let squares: [f64; 3] = std::array::from_fn(|i| (others(i).0 * others(i).1).powi(2));
+    let square = largest(squares);
+    let areas = squares.map(|x| if square > 0.0 { x / square } else { 0.0 });
+    // drag about each axis: of the widest disc that turns there, and of a slender body
+    let disc = |a: f64, b: f64| 8.0 / 15.0 * PI * a * b.powi(4);
+    let [angular, slender] = [ellipsoid.angular_drag, ellipsoid.slender_drag];
+    let turning: [f64; 3] = std::array::from_fn(|i| {
+        let across = disc(radii[i], others(i).0.max(others(i).1));
+        angular * across + slender * (disc(middle, long) - across)
+    });
+    let hardest = largest(turning.map(f64::abs));
+    let shares = turning.map(|x| if hardest > 0.0 { x / hardest } else { 0.0 });
+    // the share of these forces that acts
+    let density = ellipsoid.interaction * ellipsoid.density;
+    let viscosity = ellipsoid.interaction * ellipsoid.viscosity;
+    let magnus = ellipsoid.magnus_lift * volume;
+    FluidGeom {
+        body,
+        center: pose.pos,
+        axes: columns(pose.rotation()),
+        areas,
+        area_differences: differences(areas),
+        carried: ellipsoid.added_mass.map(|mass| density * (mass - magnus)),
+        mass_differences: differences(ellipsoid.added_mass.map(|mass| density * mass)),
+        moment_differences: differences(ellipsoid.added_moments.map(|moment| density * moment)),
+        lift: density * ellipsoid.kutta_lift * PI * square.sqrt(),
+        viscous: [
+            viscosity * 3.0 * PI * diameter,
+            viscosity * PI * diameter.powi(3),
+        ],
+        slender: density * slender * area,
+        blunt: density * PI * square.sqrt() * (ellipsoid.blunt_drag - slender),
+        turning: density * hardest,
+        turning_shares: shares,
+        wind: ellipsoid.wind,
     }
 }
 
@@ -147,6 +218,7 @@ pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
     let is_solved = |body: &usize| {
         m.free_joints.contains(body)
             || m.drags.iter().any(|drag| drag.body == *body)
+            || m.fluid_geoms.iter().any(|geom| geom.body == *body)
             || driven.iter().any(|&dof| m.dofs[dof].body == *body)
     };
     let is_alone = |body: &usize| m.bodies.iter().all(|other| other.parent != Some(*body));

@@ -152,6 +152,7 @@ pub(super) fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
             m.damped
                 || !m.free_joints.is_empty()
                 || !m.drags.is_empty()
+                || !m.fluid_geoms.is_empty()
                 || !m.actuators.damped.is_empty()
                 || tendons.iter().any(|tendon| {
                     // armature joins the free bodies that a spatial tendon pulls, whose bias is implicit

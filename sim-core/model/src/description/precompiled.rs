@@ -27,6 +27,8 @@ pub struct Precompiled {
     pub constraints: Vec<Constraint>,
     /// What the medium does to links.
     pub drags: Vec<Drag>,
+    /// What the medium does to geoms.
+    pub ellipsoids_in_fluid: Vec<EllipsoidInFluid>,
     /// Links that are held against gravity, each with its share of compensation; none where the model has no passive forces.
     pub compensations: Option<Vec<(usize, f64)>>,
     /// Spatial tendons that are measured or that act.
@@ -109,6 +111,39 @@ pub struct Drag {
     /// [N·s²/m², N·m·s²/rad²]
     pub quadratic: [[f64; 3]; 2],
     /// [m/s]
+    pub wind: [f64; 3],
+}
+
+/// A geom that counts as an ellipsoid in a medium (MuJoCo: `fluidshape`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipsoidInFluid {
+    /// Its link.
+    pub link: usize,
+    /// Its centre and axes in the link's frame.
+    pub pose: Pose,
+    /// [m]
+    pub semi_axes: [f64; 3],
+    /// The share of the forces that acts [–].
+    pub interaction: f64,
+    /// Drag of the area across the flow [–].
+    pub blunt_drag: f64,
+    /// Drag of the remaining area [–].
+    pub slender_drag: f64,
+    /// Drag of rotations [–].
+    pub angular_drag: f64,
+    /// Lift of a shape that stands across the flow [–].
+    pub kutta_lift: f64,
+    /// Lift of a shape that spins [–].
+    pub magnus_lift: f64,
+    /// Volume of medium that moves along with it, along each axis [m³].
+    pub added_mass: [f64; 3],
+    /// The same of rotations [m⁵].
+    pub added_moments: [f64; 3],
+    /// Of the medium [kg/m³].
+    pub density: f64,
+    /// Of the medium [Pa·s].
+    pub viscosity: f64,
+    /// Velocity of the medium [m/s].
     pub wind: [f64; 3],
 }
 

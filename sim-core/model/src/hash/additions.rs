@@ -10,7 +10,7 @@ use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
 use sim_physics::constants::lengths::{Length, Term};
 use sim_physics::constants::options::{Integrator, Search};
 use sim_physics::constants::outputs::{OutputBody, OutputFrames};
-use sim_physics::constants::passive::{Compensation, Drag, GravityCompensation};
+use sim_physics::constants::passive::{Compensation, Drag, FluidGeom, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon};
 use sim_physics::constants::tendons::{Inner, Span, SpatialTendon, Wrap};
@@ -28,6 +28,7 @@ pub(super) struct Additions<'a> {
     pose_springs: &'a Vec<PoseSpring<f64>>,
     free_joints: &'a Vec<usize>,
     drags: &'a Vec<Drag<f64>>,
+    fluid_geoms: &'a Vec<FluidGeom<f64>>,
     compensations: &'a Vec<Compensation<f64>>,
     passive_dofs: &'a Vec<usize>,
     actuated_dofs: &'a Vec<usize>,
@@ -90,6 +91,7 @@ impl Additions<'_> {
             solved_bodies: _,
             gyroscopic_bodies: _,
             drags,
+            fluid_geoms,
             compensation:
                 GravityCompensation {
                     links,
@@ -127,6 +129,7 @@ impl Additions<'_> {
             pose_springs: poses,
             free_joints,
             drags,
+            fluid_geoms,
             compensations: links,
             passive_dofs,
             actuated_dofs,
@@ -181,7 +184,8 @@ view! {
             "class_bodies": class_bodies,
         }
         Later { "spatial_tendons": spatial_tendons }
-        Later { "adhesions": adhesions };
+        Later { "adhesions": adhesions }
+        Later { "fluid_geoms": fluid_geoms };
     Spring<f64> as "Spring":
         Always { "dof": dof, "stiffness": stiffness, "rest": rest };
     PoseSpring<f64> as "PoseSpring":
@@ -193,6 +197,24 @@ view! {
             "axes": axes,
             "viscous": viscous,
             "quadratic": quadratic,
+            "wind": wind,
+        };
+    FluidGeom<f64> as "FluidGeom":
+        Always {
+            "body": body,
+            "center": center,
+            "axes": axes,
+            "areas": areas,
+            "area_differences": area_differences,
+            "carried": carried,
+            "mass_differences": mass_differences,
+            "moment_differences": moment_differences,
+            "lift": lift,
+            "viscous": viscous,
+            "slender": slender,
+            "blunt": blunt,
+            "turning": turning,
+            "turning_shares": turning_shares,
             "wind": wind,
         };
     Compensation<f64> as "Compensation":

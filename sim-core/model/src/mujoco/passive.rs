@@ -3,7 +3,7 @@
 use super::format::ModelFile;
 use super::frame;
 use super::options::has_flag;
-use crate::description::{Compensator, Drag};
+use crate::description::{Compensator, Drag, EllipsoidInFluid};
 use crate::error::ModelError;
 use std::f64::consts::PI;
 
@@ -32,20 +32,101 @@ pub(super) fn compensations(
 /// Least mass of a link on which the medium acts (MuJoCo: `mjMINVAL`) [kg].
 const MASS_MIN: f64 = 1e-15;
 
-/// What the medium does to links: each counts as the box that has its mass and inertia.
-pub(super) fn drags(file: &ModelFile, bodies: usize) -> Result<Vec<Drag>, ModelError> {
+/// Share of the forces of a geom as an ellipsoid, blunt, slender and angular drag, lift after Kutta and Magnus, then the volumes
+/// that move along with it and turn with it: a row of `geom_fluid`.
+const FLUID_COLUMNS: usize = 12;
+
+/// Does the medium act on anything?
+fn has_medium(file: &ModelFile) -> Result<bool, ModelError> {
     let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
-    if is_off(file)? || (density <= 0.0 && viscosity <= 0.0) {
+    Ok(!is_off(file)? && (density > 0.0 || viscosity > 0.0))
+}
+
+/// Of each body, does the medium act on its geoms as ellipsoids? Where one does, MuJoCo leaves out the body's box.
+fn are_ellipsoids(file: &ModelFile, bodies: usize) -> Result<Vec<bool>, ModelError> {
+    let geoms = file.rows("geom_type");
+    let rows = file.vectors::<FLUID_COLUMNS>("geom_fluid", geoms)?;
+    let places = file.indices("geom_bodyid", geoms, bodies)?;
+    let mut are = vec![false; bodies];
+    for (row, body) in rows.iter().zip(places) {
+        if let Some(body) = body.filter(|_| row[0] > 0.0) {
+            are[body] = true;
+        }
+    }
+    Ok(are)
+}
+
+/// What the medium does to geoms that count as ellipsoids.
+pub(super) fn ellipsoids(
+    file: &ModelFile,
+    bodies: usize,
+) -> Result<Vec<EllipsoidInFluid>, ModelError> {
+    if !has_medium(file)? {
         return Ok(Vec::new());
     }
+    let geoms = file.rows("geom_type");
+    let kinds = file.kinds("geom_type", geoms)?;
+    let links = file.indices("geom_bodyid", geoms, bodies)?;
+    let centers = file.vectors::<3>("geom_pos", geoms)?;
+    let turns = file.vectors::<4>("geom_quat", geoms)?;
+    let sizes = file.vectors::<3>("geom_size", geoms)?;
+    let rows = file.vectors::<FLUID_COLUMNS>("geom_fluid", geoms)?;
+    let masses = file.reals("body_mass", bodies)?;
+    let are_ellipsoids = are_ellipsoids(file, bodies)?;
+    let wind = file.vectors::<3>("opt.wind", 1)?[0];
+    let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
+    let mut ellipsoids = Vec::new();
+    for geom in 0..geoms {
+        let row = rows[geom];
+        let acts = |&body: &usize| are_ellipsoids[body] && masses[body] >= MASS_MIN;
+        let Some(link) = links[geom].filter(acts).filter(|_| row[0] != 0.0) else {
+            continue;
+        };
+        ellipsoids.push(EllipsoidInFluid {
+            link,
+            pose: frame(centers[geom], turns[geom]),
+            semi_axes: semi_axes(&kinds[geom], sizes[geom]),
+            interaction: row[0],
+            blunt_drag: row[1],
+            slender_drag: row[2],
+            angular_drag: row[3],
+            kutta_lift: row[4],
+            magnus_lift: row[5],
+            added_mass: [row[6], row[7], row[8]],
+            added_moments: [row[9], row[10], row[11]],
+            density,
+            viscosity,
+            wind,
+        });
+    }
+    Ok(ellipsoids)
+}
+
+/// Semi-axes of the ellipsoid that a geom counts as; of a mesh, half of the box about it [m].
+fn semi_axes(kind: &str, [a, b, c]: [f64; 3]) -> [f64; 3] {
+    match kind {
+        "mjGEOM_SPHERE" => [a; 3],
+        "mjGEOM_CAPSULE" => [a, a, a + b],
+        "mjGEOM_CYLINDER" => [a, a, b],
+        _ => [a, b, c],
+    }
+}
+
+/// What the medium does to links that have no geoms that count as ellipsoids: each is the box that has its mass and inertia.
+pub(super) fn drags(file: &ModelFile, bodies: usize) -> Result<Vec<Drag>, ModelError> {
+    if !has_medium(file)? {
+        return Ok(Vec::new());
+    }
+    let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
     let (density, viscosity) = (density.max(0.0), viscosity.max(0.0));
+    let are_ellipsoids = are_ellipsoids(file, bodies)?;
     let wind = file.vectors::<3>("opt.wind", 1)?[0];
     let masses = file.reals("body_mass", bodies)?;
     let centers = file.vectors::<3>("body_ipos", bodies)?;
     let turns = file.vectors::<4>("body_iquat", bodies)?;
     let moments = file.vectors::<3>("body_inertia", bodies)?;
-    let heavy = (0..bodies).filter(|&body| masses[body] >= MASS_MIN);
-    let drags = heavy.map(|body| {
+    let boxes = (0..bodies).filter(|&body| masses[body] >= MASS_MIN && !are_ellipsoids[body]);
+    let drags = boxes.map(|body| {
         let whole: f64 = moments[body].iter().sum();
         // I = m (b² + c²) / 12 of each axis
         let square = |moment: f64| (whole - 2.0 * moment).max(MASS_MIN) / masses[body] * 6.0;

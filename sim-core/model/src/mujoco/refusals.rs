@@ -9,10 +9,9 @@ use super::pairs;
 use crate::error::ModelError;
 use crate::softness::POWER_MAX;
 
-/// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature.
-const MUST_BE_ZERO: &[(&str, &str, &str)] = &[("geom", "geom_fluid", "the ellipsoid fluid model")];
-/// The same, of arrays that older versions of MuJoCo do not have.
-const NEWER_MUST_BE_ZERO: &[(&str, &str, &str)] = &[
+/// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature. Older
+/// versions of MuJoCo do not have them.
+const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("pair", "pair_adhesion", "adhesion"),
     ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
     ("joint", "jnt_springyield", "plastic springs"),
@@ -76,10 +75,7 @@ pub(super) fn listed(reasons: &[String]) -> String {
 /// A file that lacks arrays.
 pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     let mut refused = Vec::new();
-    if let Some((_, array, _)) = MUST_BE_ZERO.iter().find(|(_, array, _)| !file.has(array)) {
-        return Err(file.fault(format!("lacks the array `{array}`; save the scene again")));
-    }
-    for (kind, array, feature) in MUST_BE_ZERO.iter().chain(NEWER_MUST_BE_ZERO) {
+    for (kind, array, feature) in MUST_BE_ZERO {
         if let Some(row) = file.first_set(array) {
             let names = names(file, kind, file.rows(array))?;
             refused.push(no(kind, &names[row], feature));

@@ -108,6 +108,7 @@ fn parts(
         equalities: super::constraints::equalities(file)?,
         constraints: Vec::new(),
         drags: passive::drags(file, bodies)?,
+        ellipsoids_in_fluid: passive::ellipsoids(file, bodies)?,
         compensations: passive::compensations(file, bodies)?,
         spatial_tendons: Vec::new(),
         tendons: Vec::new(),

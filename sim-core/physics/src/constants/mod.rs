@@ -28,7 +28,7 @@ use self::contact::Contacts;
 use self::options::{Integrator, Newton, Search};
 use self::outputs::OutputFrames;
 use self::params::{COMMAND_NOISES, Varying};
-use self::passive::{Drag, GravityCompensation};
+use self::passive::{Drag, FluidGeom, GravityCompensation};
 use self::recast::{recast, same};
 use self::scan::HeightScan;
 use self::sensors::Sensors;
@@ -104,6 +104,8 @@ recast! {
         pub gyroscopic_bodies: Vec<usize>,
         /// What the medium does to links.
         pub drags: Vec<Drag<R>>,
+        /// What the medium does to geoms.
+        pub fluid_geoms: Vec<FluidGeom<R>>,
         /// Links that are held against gravity.
         pub compensation: GravityCompensation<R>,
         /// Constraints whose Jacobians are found at run time.

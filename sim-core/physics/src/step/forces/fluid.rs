@@ -1,4 +1,5 @@
 //! Forces of the medium around links (MuJoCo documentation, "Computation: fluid forces, inertia model").
+//! Links with geoms that count as ellipsoids have other forces: [`super::ellipsoid_fluid`].
 //!
 //! ```text
 //! f(i) = -(cᵥ + dᵥ(i) |v(i)|) v(i)      v: velocity of the centre of mass less the wind, along the axes i of inertia
@@ -12,7 +13,7 @@
 //! M += h Σ Jᵀ B J      B = diag(c + 2 d |v|)      and h Jᵀ B J c less on the right, c as in [`crate::step::tree::free_joints`]
 //! ```
 
-use super::link_forces;
+use super::{ellipsoid_fluid, link_forces};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::passive::Drag;
@@ -35,7 +36,7 @@ impl Stage for Fluid {
     const WRITES: &'static [A] = &[A::SmoothForce];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        !m.drags.is_empty()
+        is_there(m)
     }
 
     #[inline(always)]
@@ -46,6 +47,12 @@ impl Stage for Fluid {
             *smooth = *smooth + *projected;
         }
     }
+}
+
+/// Does a medium act on anything?
+#[inline(always)]
+pub(in crate::step) fn is_there<R>(m: &Constants<R>) -> bool {
+    !m.drags.is_empty() || !m.fluid_geoms.is_empty()
 }
 
 /// Writes the forces of the medium to `joint_force`.
@@ -64,6 +71,7 @@ pub(in crate::step) fn forces<F: Num>(m: &Constants<F::Real>, w: &mut Workspace<
         }
         link_forces::add(w, drag.body, flow.point, force, torque);
     }
+    ellipsoid_fluid::add_forces(m, w);
     // Σ Jᵀ f over all links
     link_forces::project(m, w);
 }
@@ -107,6 +115,7 @@ impl<F: Num> Flow<F> {
 /// Adds h Jᵀ B J to the mass matrix, and subtracts h Jᵀ B J c from the right-hand side, `acceleration`.
 #[inline(always)]
 pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    ellipsoid_fluid::add_damping::<C>(m, b);
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
     for drag in &m.drags {
         let flow = Flow::around(w, drag);

@@ -99,7 +99,7 @@ impl Stage for Passive {
                 passive[d] = passive[d] + b.work.joint_force[d];
             }
         }
-        if !m.drags.is_empty() {
+        if fluid::is_there(m) {
             fluid::forces(m, &mut b.work);
             for (force, drag) in passive.iter_mut().zip(&b.work.joint_force) {
                 *force = *force + *drag;

@@ -33,7 +33,7 @@ use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::forces::{actuators, damping, fluid};
+use crate::step::forces::{actuators, damping, ellipsoid_fluid, fluid};
 use crate::step::tree::free_joints;
 use crate::step::tree::generalized::keep_accelerations;
 use crate::step::tree::kinematics::read_quat;
@@ -165,7 +165,9 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
     free_joints::add_damping(cx, m, b);
     // h N is not symmetric: these bodies are solved apart, while their block of the matrix is there
     for &body in &m.solved_bodies {
-        free_joints::solve(cx, m, b, body);
+        let mut system = free_joints::system(cx, m, b, body);
+        ellipsoid_fluid::add_to_system::<C>(m, b, body, &mut system);
+        free_joints::solve::<C>(m, b, body, system);
     }
     // the other bodies, then the entries of those that were solved apart
     let w = &mut b.work;

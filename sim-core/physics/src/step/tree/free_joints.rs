@@ -213,12 +213,17 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Bl
     }
 }
 
-/// Solves (H + h N) a = b for a free body, H its block of the mass matrix and b its part of `acceleration`; leaves a in `minimum`.
+/// The system (H + h N) a = b of a free body, H its block of the mass matrix and b its part of `acceleration`, in column 6.
 #[inline(always)]
-pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, body: usize) {
+pub(in crate::step) fn system<C: Cx>(
+    cx: &C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    body: usize,
+) -> [[C::F; 7]; 6] {
     let (first, dt) = (m.bodies[body].dof, C::F::k(m.dt));
     let spin = spin(cx, b, first);
-    let w = &mut b.work;
+    let w = &b.work;
     let zero = C::F::c(0.0);
     // six rows, and the right-hand side
     let mut system = [[zero; 7]; 6];
@@ -240,8 +245,20 @@ pub(in crate::step) fn solve<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut BlockOf<
             system[3 + i][3 + j] = dt.fma(torque[i], system[3 + i][3 + j]);
         }
     }
+    system
+}
+
+/// Solves the system of a free body; leaves a in `minimum`.
+#[inline(always)]
+pub(in crate::step) fn solve<C: Cx>(
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    body: usize,
+    mut system: [[C::F; 7]; 6],
+) {
     // Gauss' elimination, then back substitution from the last row
-    let solution = &mut w.minimum[first..first + 6];
+    let first = m.bodies[body].dof;
+    let solution = &mut b.work.minimum[first..first + 6];
     eliminate(&mut system);
     for i in (0..6).rev() {
         let mut x = system[i][6];
