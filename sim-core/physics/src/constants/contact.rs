@@ -70,7 +70,7 @@ recast! {
         pub named_pairs: Fixed,
         /// Whether capsules and boxes have the points of `collide::primitive::capsule_box`.
         pub two_point_capsule_boxes: bool,
-        /// Whether the corners of a box on a plane are in MuJoCo's order, which matters where contacts are swept.
+        /// Whether the corners of a box on a plane or on a box are in MuJoCo's order, which matters where contacts are swept.
         pub ordered_corners: bool,
         /// Impedances of pairs.
         pub impedances: PairImpedances<R>,

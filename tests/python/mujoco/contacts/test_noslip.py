@@ -31,6 +31,8 @@ XML = """<mujoco><option cone="{cone}" noslip_iterations="{sweeps}" noslip_toler
   <body pos="6 0 .0985"><freejoint/><geom type="cylinder" size=".15 .1"/></body>
   <body pos="7 0 .0985"><joint name="turn" type="ball" frictionloss=".1"/><geom size=".1" pos=".05 0 0"/>
   </body>
+  <body pos="8 0 .099"><freejoint/><geom type="box" size=".3 .25 .1"/></body>
+  <body pos="8.05 .02 .297"><freejoint/><geom type="box" size=".15 .1 .1"/></body>
 </worldbody>
 <tendon><fixed name="both" frictionloss=".15"><joint joint="lift" coef="1"/><joint joint="elbow" coef="-.5"/></fixed>
 </tendon></mujoco>"""

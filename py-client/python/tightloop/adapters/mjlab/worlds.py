@@ -30,7 +30,8 @@ _KEPT = ("time", "qacc_warmstart")
 #: Fields that steps and evaluations fill.
 FILLED = (
     "xpos xquat xmat xipos ximat cvel subtree_com site_xpos site_xmat geom_xpos geom_xmat sensordata qacc "
-    "actuator_force actuator_length actuator_velocity qfrc_actuator qfrc_constraint qfrc_bias qfrc_passive"
+    "ten_length ten_velocity actuator_force actuator_length actuator_velocity "
+    "qfrc_actuator qfrc_constraint qfrc_bias qfrc_passive"
 ).split()
 #: Fields that MuJoCo-Warp's kinematics fill in `Simulation.forward`.
 LIT = ("cam_xpos", "cam_xmat", "light_xpos", "light_xdir")

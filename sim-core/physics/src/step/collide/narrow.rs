@@ -133,7 +133,7 @@ pub struct ShapePair<'a, C: Cx> {
     pub clip_tables: Cut,
     /// Whether capsules and boxes have the points of [`super::primitive::capsule_box`]; the same for all pairs of a model.
     pub two_point_capsule_boxes: bool,
-    /// Whether corners of a box on a plane are in MuJoCo's order; the same for all pairs of a model.
+    /// Whether corners of a box are in MuJoCo's order; the same for all pairs of a model.
     pub ordered_corners: bool,
 }
 

@@ -94,9 +94,15 @@ impl<F: Num> FacePair<F> {
     /// Adds the points of the incident face clipped to the reference rectangle.
     ///
     /// There are twelve candidates: where each incident edge enters, where it leaves if it was cut, and the corners of the
-    /// reference face inside the incident one.
+    /// reference face inside the incident one. `ordered` edges are in MuJoCo's order.
     #[inline(always)]
-    pub fn add_clipped<C: Cx<F = F>>(&self, cx: &mut C, margin: F, out: &mut Points<C>) {
+    pub fn add_clipped<C: Cx<F = F>>(
+        &self,
+        cx: &mut C,
+        margin: F,
+        ordered: bool,
+        out: &mut Points<C>,
+    ) {
         let c = F::c;
         let one = c(1.0);
         // the reference rectangle a little larger, the incident one a little smaller, so equal faces agree
@@ -108,27 +114,29 @@ impl<F: Num> FacePair<F> {
         let [e1, e2] = self.edges;
         let middle = self.middle;
         // an incident edge is start + t run with |t| ≤ 1, at either end of the other direction
-        for (across, run, sense) in [(e2, e1, -1.0), (e1, e2, 1.0)] {
+        for (along_first, s) in edge_order(ordered) {
+            let (across, run, sense) = match along_first {
+                true => (e2, e1, -1.0),
+                false => (e1, e2, 1.0),
+            };
             let (x, y) = (reciprocal(run[0]), reciprocal(run[1]));
             // |start + t run| ≤ side along u and v bounds t; no interval is left where low ≥ high
             let (wx, wy) = (wide_u * x.abs(), wide_v * y.abs());
-            for s in [-1.0, 1.0] {
-                let start = across.scale_add(c(s), middle);
-                let (at_x, at_y) = (start[0] * x, start[1] * y);
-                let low = (-at_x - wx).max(-at_y - wy).max(-one);
-                let high = (wx - at_x).min(wy - at_y).min(one);
-                let inside = low.lt(high);
-                // around the face each edge ends where the next one starts
-                let (enter, leave, is_cut) = match s == sense {
-                    true => (low, high, high.lt(one)),
-                    false => (high, low, (-one).lt(low)),
-                };
-                let is_cut = inside & is_cut;
-                let (enter, leave) = (run.scale_add(enter, start), run.scale_add(leave, start));
-                // candidates count up to the margin above the reference face
-                self.add(cx, inside & enter[2].lt(margin), enter, out);
-                self.add(cx, is_cut & leave[2].lt(margin), leave, out);
-            }
+            let start = across.scale_add(c(s), middle);
+            let (at_x, at_y) = (start[0] * x, start[1] * y);
+            let low = (-at_x - wx).max(-at_y - wy).max(-one);
+            let high = (wx - at_x).min(wy - at_y).min(one);
+            let inside = low.lt(high);
+            // around the face each edge ends where the next one starts
+            let (enter, leave, is_cut) = match s == sense {
+                true => (low, high, high.lt(one)),
+                false => (high, low, (-one).lt(low)),
+            };
+            let is_cut = inside & is_cut;
+            let (enter, leave) = (run.scale_add(enter, start), run.scale_add(leave, start));
+            // candidates count up to the margin above the reference face
+            self.add(cx, inside & enter[2].lt(margin), enter, out);
+            self.add(cx, is_cut & leave[2].lt(margin), leave, out);
         }
         // corners of the reference face in the coordinates of the incident one (Cramer's rule)
         let inverse = one.div(e1[1].fnma(e2[0], e1[0] * e2[1]));
@@ -151,5 +159,15 @@ impl<F: Num> FacePair<F> {
         let up = self.outwards.scale_add(at[2] * F::c(0.5), self.origin);
         let position = self.axes[0].scale_add(at[0], self.axes[1].scale_add(at[1], up));
         out.add(cx, mask, position, at[2], self.normal);
+    }
+}
+
+/// The incident edges: whether each runs along the first of its face's axes, and on which side of the other it lies.
+#[inline(always)]
+fn edge_order(ordered: bool) -> [(bool, f64); 4] {
+    match ordered {
+        false => [(true, -1.0), (true, 1.0), (false, -1.0), (false, 1.0)],
+        // around the face, from the corner on the positive side of both axes
+        true => [(true, 1.0), (false, -1.0), (true, -1.0), (false, 1.0)],
     }
 }

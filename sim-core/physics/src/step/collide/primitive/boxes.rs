@@ -74,7 +74,8 @@ pub fn box_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) 
             // faces make up to eight points, edges one; worlds of a block may need either
             let best = best_axis(&faces, &edge, half_a, half_b);
             when!(cx, !best.edge, {
-                FacePair::from_axis(pair, &best).add_clipped(cx, margin, out);
+                let faces = FacePair::from_axis(pair, &best);
+                faces.add_clipped(cx, margin, pair.ordered_corners, out);
             });
             when!(cx, best.edge, {
                 add_edge_contact(cx, pair, &best, out);
