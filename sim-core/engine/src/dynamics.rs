@@ -6,6 +6,7 @@ use crate::backend::{BackendError, Lanes, Precision, Values};
 use crate::simulation::{Options, Simulation};
 use sim_model::Model;
 use sim_physics::arrays::Field;
+use sim_physics::constants::Dof;
 use std::sync::Arc;
 
 /// Fields that [`Dynamics`] evaluates; each depends on positions and velocities only.
@@ -89,7 +90,7 @@ impl Dynamics {
     /// Joint forces that give the accelerations `joint_qdd`: `M q̈ + c`, and `+ d q̇` with `damping`. `(states, dofs)`
     /// [N·m or N]
     ///
-    /// M has the armature in it, c is [`Field::BiasForce`], d the joint's damping. Drives, dry friction, limits, mimic
+    /// M has the armature in it, c is [`Field::BiasForce`], d the joint's damping at its speed. Drives, dry friction, limits, mimic
     /// joints and contacts are left out. `joint_qd` and `joint_qdd` are `(states, dofs)`, or empty for zeros. Sent as
     /// `joint_f`, the result makes a joint without these accelerate by `joint_qdd`.
     ///
@@ -123,7 +124,14 @@ impl Dynamics {
                     .map(|(k, m)| m * qdd.get(k).copied().unwrap_or(0.0))
                     .sum();
                 let passive = match (damping, qd.get(dof)) {
-                    (true, Some(qd)) => model.constants().dofs[dof].damping * qd,
+                    (true, Some(qd)) => {
+                        let Dof {
+                            damping,
+                            damping_curve: [a, b],
+                            ..
+                        } = model.constants().dofs[dof];
+                        (damping + a * qd.abs() + b * qd * qd) * qd
+                    }
                     _ => 0.0,
                 };
                 forces.push(inertial + bias + passive);

@@ -149,22 +149,18 @@ def _geom(found: Arrays, place: int) -> list[str]:
 
 
 def _joint(found: Arrays, place: int) -> list[str]:
-    _zero(found, place, "jnt_stiffnesspoly", "jnt_springyield")
+    _zero(found, place, "jnt_springyield")
     single = texts(found["jnt_type.names"])[found["jnt_type"][place]] in ("mjJNT_HINGE", "mjJNT_SLIDE")
     if not single:
         _zero(found, place, "jnt_actfrclimited")
     first = found["jnt_dofadr"][place]
     following = found["jnt_dofadr"][found["jnt_dofadr"] > first]
     end = following.min() if len(following) else len(found["dof_armature"])
-    for dof in range(first, end):
-        _zero(found, dof, "dof_dampingpoly")
     powers = [
         _bound_power(found, slice(place, place + 1), "jnt_solimp"),
         _bound_power(found, slice(int(first), int(end)), "dof_solimp"),
     ]
-    return [
-        "has a linear spring and damping" + ("" if single else ", and no bound of its actuators' forces") + max(powers)
-    ]
+    return ["has no plastic spring" + ("" if single else ", and no bound of its actuators' forces") + max(powers)]
 
 
 def _pair(found: Arrays, place: int) -> list[str]:

@@ -263,6 +263,7 @@ impl BodyBuilder {
                 entries: (0, 0),
                 armature: dof.armature,
                 damping: dof.damping,
+                damping_curve: [0.0; 2],
                 ke: if drives_position { dof.target_ke } else { 0.0 },
                 kd: dof.target_kd,
                 follows_position: drives_position,

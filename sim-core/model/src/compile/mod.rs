@@ -46,7 +46,7 @@ use sim_physics::constants::params::{Param, Varying};
 use sim_physics::constants::passive::GravityCompensation;
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::Springs;
-use sim_physics::constants::{Constants, Coupled, Delay};
+use sim_physics::constants::{Constants, Coupled, Delay, Dof};
 use solver::{classes_of_roots, is_damped, newton, noslip, precompiled_parts, search};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -112,7 +112,8 @@ fn bodies_alone(
     let of_dofs: BTreeSet<usize> = mass_entries.iter().map(|entry| entry.place).collect();
     let mass_zeros = (0..pattern.len()).filter(|place| !of_dofs.contains(place));
     let varies = |param| scene.params.contains(&param);
-    let damped = builder.dofs.iter().any(|d| d.damping + d.kd > 0.0)
+    let resists = |d: &Dof<f64>| d.damping + d.kd > 0.0 || d.damping_curve != [0.0; 2];
+    let damped = builder.dofs.iter().any(resists)
         || varies(Param::JointDamping)
         || varies(Param::JointTargetKd);
     Ok(Constants {

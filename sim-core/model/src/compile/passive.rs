@@ -22,18 +22,27 @@ impl BodyBuilder {
     pub(super) fn add_passive(&mut self, joint: &Joint, extras: &JointExtras, dofs: Range<usize>) {
         let body = self.dofs[dofs.start].body;
         let has_pose = matches!(joint.kind, JointKind::Ball | JointKind::Free);
-        if extras.stiffness != 0.0 && has_pose {
+        for (dof, curve) in self.dofs[dofs.clone()]
+            .iter_mut()
+            .zip(extras.damping_curves)
+        {
+            dof.damping_curve = curve;
+        }
+        let has_spring = extras.stiffness != 0.0 || extras.stiffness_curve != [0.0; 2];
+        if has_spring && has_pose {
             self.springs.poses.push(PoseSpring {
                 body,
                 stiffness: extras.stiffness,
                 position: extras.spring_pose.pos,
                 quat: extras.spring_pose.quat,
+                curve: extras.stiffness_curve,
             });
-        } else if extras.stiffness != 0.0 {
+        } else if has_spring {
             self.springs.joints.push(Spring {
                 dof: dofs.start,
                 stiffness: extras.stiffness,
                 rest: extras.spring_ref,
+                curve: extras.stiffness_curve,
             });
         }
         if joint.kind == JointKind::Free {
@@ -180,7 +189,7 @@ pub(super) fn keep_acting(m: &mut Constants<f64>, scene: &Description) {
         varies
             || body_dofs
                 .iter()
-                .any(|dof| dof.armature != 0.0 || dof.damping != 0.0)
+                .any(|dof| [dof.armature, dof.damping] != [0.0; 2] || dof.damping_curve != [0.0; 2])
     });
     let of_free_joint = |dof: &usize| m.free_joints.contains(&dofs[*dof].body);
     m.diagonal_dofs = (0..dofs.len()).filter(|dof| !of_free_joint(dof)).collect();
@@ -212,7 +221,9 @@ pub(super) fn add_implicit(m: &mut Constants<f64>, scene: &Description) {
     let turning = damped.flat_map(|actuator| &actuator.turning);
     let mut driven: Vec<usize> = turning.flat_map(|length| length.dofs.clone()).collect();
     let dampers = m.springs.tendons.iter();
-    let damped = dampers.filter(|tendon| tendon.damping != 0.0 || tendon.armature != 0.0);
+    let damped = dampers.filter(|tendon| {
+        [tendon.damping, tendon.armature] != [0.0; 2] || tendon.damping_curve != [0.0; 2]
+    });
     let spatial = damped.filter_map(|tendon| tendon.length.tendon);
     driven.extend(spatial.flat_map(|tendon| m.tendons[tendon].dofs.clone()));
     let is_solved = |body: &usize| {

@@ -157,7 +157,7 @@ pub(super) fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
                 || tendons.iter().any(|tendon| {
                     // armature joins the free bodies that a spatial tendon pulls, whose bias is implicit
                     let is_heavy = tendon.armature != 0.0 && tendon.length.tendon.is_some();
-                    tendon.damping != 0.0 || is_heavy
+                    tendon.damping != 0.0 || tendon.damping_curve != [0.0; 2] || is_heavy
                 })
         }
     }

@@ -50,6 +50,8 @@ impl Lengths<'_> {
             rest: tendon.rest,
             damping: tendon.damping,
             armature: tendon.armature,
+            stiffness_curve: tendon.stiffness_curve,
+            damping_curve: tendon.damping_curve,
         }
     }
 

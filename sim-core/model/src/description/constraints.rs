@@ -83,4 +83,8 @@ pub struct Tendon {
     pub damping: f64,
     /// [kg or kg·m²]
     pub armature: f64,
+    /// By which its stiffness grows with the stretch and its square [N/m², N/m³ or N·m/rad², N·m/rad³].
+    pub stiffness_curve: [f64; 2],
+    /// By which its damping grows with the speed and its square [N·s²/m², N·s³/m³ or N·m·s²/rad², N·m·s³/rad³].
+    pub damping_curve: [f64; 2],
 }

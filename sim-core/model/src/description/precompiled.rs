@@ -85,6 +85,11 @@ pub struct JointExtras {
     pub stiffness: f64,
     /// Position without force of the spring [rad or m].
     pub spring_ref: f64,
+    /// By which its stiffness grows with the stretch and its square [N·m/rad², N·m/rad³ or N/m², N/m³].
+    pub stiffness_curve: [f64; 2],
+    /// By which the damping of each of its dofs grows with the speed and its square [N·m·s²/rad², N·m·s³/rad³ or N·s²/m²,
+    /// N·s³/m³].
+    pub damping_curves: [[f64; 2]; 6],
     /// Pose without force of the spring of a ball or a free joint.
     pub spring_pose: Pose,
     /// What compensates gravity along it.

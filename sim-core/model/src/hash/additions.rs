@@ -187,9 +187,11 @@ view! {
         Later { "adhesions": adhesions }
         Later { "fluid_geoms": fluid_geoms };
     Spring<f64> as "Spring":
-        Always { "dof": dof, "stiffness": stiffness, "rest": rest };
+        Always { "dof": dof, "stiffness": stiffness, "rest": rest }
+        Later { "curve": curve };
     PoseSpring<f64> as "PoseSpring":
-        Always { "body": body, "stiffness": stiffness, "position": position, "quat": quat };
+        Always { "body": body, "stiffness": stiffness, "position": position, "quat": quat }
+        Later { "curve": curve };
     Drag<f64> as "Drag":
         Always {
             "body": body,
@@ -221,7 +223,9 @@ view! {
         Always { "body": body, "link": link, "mass": mass, "share": share, "center": center };
     Tendon<f64> as "Tendon":
         Always { "terms": length, "stiffness": stiffness, "rest": rest, "damping": damping }
-        Later { "armature": armature };
+        Later { "armature": armature }
+        Later { "stiffness_curve": stiffness_curve }
+        Later { "damping_curve": damping_curve };
     Actuator<f64> as "Actuator":
         Always {
             "terms": terms,

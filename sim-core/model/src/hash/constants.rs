@@ -49,7 +49,8 @@ view! {
             "follows_position": follows_position,
             "follows_velocity": follows_velocity,
             "effort_limit": effort_limit,
-        };
+        }
+        Later { "damping_curve": damping_curve };
     MassEntry as "MassEntry":
         Always { "other": other, "place": place };
     Tree<f64> as "Tree":

@@ -324,12 +324,25 @@ fn add_springs(
     };
     let stiffness = kept("tendon_stiffness", "mjDSBL_SPRING")?;
     let damping = kept("tendon_damping", "mjDSBL_DAMPER")?;
+    let stiffness_curves = file.curves(
+        "tendon_stiffnesspoly",
+        count,
+        has_flag(file, "mjDSBL_SPRING")?,
+    )?;
+    let damping_curves = file.curves(
+        "tendon_dampingpoly",
+        count,
+        has_flag(file, "mjDSBL_DAMPER")?,
+    )?;
     let armature = match file.has("tendon_armature") {
         true => file.reals("tendon_armature", count)?,
         false => vec![0.0; count],
     };
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
-    let acts = |k: &usize| [stiffness[*k], damping[*k], armature[*k]] != [0.0; 3];
+    let acts = |&k: &usize| {
+        [stiffness[k], damping[k], armature[k]] != [0.0; 3]
+            || [stiffness_curves[k], damping_curves[k]] != [[0.0; 2]; 2]
+    };
     for k in (0..count).filter(acts) {
         parts.tendons.push(Tendon {
             length: tendons.length(file, k as i64)?.clone(),
@@ -337,6 +350,8 @@ fn add_springs(
             rest: rests[k],
             damping: damping[k],
             armature: armature[k],
+            stiffness_curve: stiffness_curves[k],
+            damping_curve: damping_curves[k],
         });
     }
     Ok(())

@@ -151,6 +151,20 @@ impl ModelFile {
         Ok(all.as_chunks::<N>().0.to_vec())
     }
 
+    /// How stiffness or damping grows, two numbers a row; all are 0 where this version of MuJoCo has no such array, or the
+    /// option that `is_off` stands for switches it off.
+    pub fn curves(
+        &self,
+        name: &str,
+        count: usize,
+        is_off: bool,
+    ) -> Result<Vec<[f64; 2]>, ModelError> {
+        match self.has(name) && !is_off {
+            true => self.vectors(name, count),
+            false => Ok(vec![[0.0; 2]; count]),
+        }
+    }
+
     /// The first columns of an array whose rows differ in length between versions of MuJoCo.
     pub fn first_columns<const N: usize>(
         &self,

@@ -13,12 +13,9 @@ use crate::softness::POWER_MAX;
 /// versions of MuJoCo do not have them.
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("pair", "pair_adhesion", "adhesion"),
-    ("joint", "jnt_stiffnesspoly", "nonlinear stiffness"),
     ("joint", "jnt_springyield", "plastic springs"),
     ("geom", "geom_adhesion", "adhesion"),
     ("geom", "geom_surfacevel", "surface velocity"),
-    ("tendon", "tendon_dampingpoly", "damping of a tendon"),
-    ("tendon", "tendon_stiffnesspoly", "stiffness of a tendon"),
     ("tendon", "tendon_springyield", "plastic springs"),
     ("actuator", "actuator_delay", "a delay"),
     ("actuator", "actuator_armature", "armature of an actuator"),
@@ -125,7 +122,6 @@ fn joints(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError>
     let kinds = file.kinds("jnt_type", joints)?;
     let firsts = file.integers("jnt_dofadr", joints)?;
     let dofs = file.rows("dof_armature");
-    let curved = file.first_set("dof_dampingpoly");
     let bounded = file.integers("jnt_actfrclimited", joints)?;
     let limits = file.vectors::<5>("jnt_solimp", joints)?;
     let frictions = file.vectors::<5>("dof_solimp", dofs)?;
@@ -138,19 +134,11 @@ fn joints(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError>
         };
         let first = usize::try_from(firsts[joint]).unwrap_or(dofs).min(dofs);
         let joint_dofs = first..(first + count).min(dofs);
-        let wrong = [
-            (
-                count > 1 && bounded[joint] != 0,
-                "bounds of actuator forces",
-            ),
-            (
-                curved.is_some_and(|dof| joint_dofs.contains(&dof)),
-                "nonlinear damping",
-            ),
-        ];
-        let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
-        refused.extend(wrong.map(|(_, what)| no("joint", name, &format!("{what} of {kind}"))));
-        let softness = std::iter::once(&limits[joint]).chain(&frictions[joint_dofs.clone()]);
+        if count > 1 && bounded[joint] != 0 {
+            let bounds = format!("bounds of actuator forces of {kind}");
+            refused.push(no("joint", name, &bounds));
+        }
+        let softness = std::iter::once(&limits[joint]).chain(&frictions[joint_dofs]);
         for solimp in softness {
             refuse_power(refused, "joint", name, solimp);
         }

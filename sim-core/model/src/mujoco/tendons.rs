@@ -212,6 +212,10 @@ pub(super) fn used(file: &ModelFile, count: usize) -> Result<Vec<bool>, ModelErr
         let values = file.reals(array, count)?;
         (used.iter_mut().zip(values)).for_each(|(used, value)| *used |= value != 0.0);
     }
+    for array in ["tendon_stiffnesspoly", "tendon_dampingpoly"] {
+        let curves = file.curves(array, count, false)?;
+        (used.iter_mut().zip(curves)).for_each(|(used, curve)| *used |= curve != [0.0; 2]);
+    }
     let limited = file.integers("tendon_limited", count)?;
     (used.iter_mut().zip(limited)).for_each(|(used, limited)| *used |= limited != 0);
     // what names a tendon: arrays of kinds, of indices, and the kind that counts

@@ -152,10 +152,12 @@ struct JointArrays {
     ranges: Vec<[f64; 2]>,
     margins: Vec<f64>,
     stiffness: Vec<f64>,
+    stiffness_curves: Vec<[f64; 2]>,
     limits: Vec<Softness>,
     is_bounded: Vec<i64>,
     bounds: Vec<[f64; 2]>,
     damping: Vec<f64>,
+    damping_curves: Vec<[f64; 2]>,
     armature: Vec<f64>,
     friction: Vec<f64>,
     frictions: Vec<Softness>,
@@ -204,10 +206,12 @@ impl JointArrays {
             ranges: file.vectors("jnt_range", joints)?,
             margins: file.reals("jnt_margin", joints)?,
             stiffness: kept(file.reals("jnt_stiffness", joints)?, springs_off),
+            stiffness_curves: file.curves("jnt_stiffnesspoly", joints, springs_off)?,
             limits: softness(file, "jnt", joints)?,
             is_bounded: file.integers("jnt_actfrclimited", joints)?,
             bounds: file.vectors("jnt_actfrcrange", joints)?,
             damping: kept(file.reals("dof_damping", dofs)?, dampers_off),
+            damping_curves: file.curves("dof_dampingpoly", dofs, dampers_off)?,
             armature: file.reals("dof_armature", dofs)?,
             friction: kept(file.reals("dof_frictionloss", dofs)?, friction_off),
             frictions: softness(file, "dof", dofs)?,
@@ -320,6 +324,8 @@ impl JointArrays {
             })
             .collect();
         let is_scalar = dofs == 1;
+        let mut damping_curves = [[0.0; 2]; 6];
+        damping_curves[..dofs].copy_from_slice(&self.damping_curves[dof..dof + dofs]);
         let extras = JointExtras {
             anchor: if kind == JointKind::Free {
                 [0.0; 3]
@@ -328,6 +334,8 @@ impl JointArrays {
             },
             reference: if is_scalar { self.qpos0[coord] } else { 0.0 },
             stiffness: self.stiffness[k],
+            stiffness_curve: self.stiffness_curves[k],
+            damping_curves,
             spring_ref: if is_scalar {
                 self.qpos_spring[coord]
             } else {

@@ -255,6 +255,8 @@ recast! {
         pub armature: R,
         /// Passive damping [N·m·s/rad or N·s/m].
         pub damping: R,
+        /// By which its damping grows with the speed and its square [N·m·s²/rad², N·m·s³/rad³ or N·s²/m², N·s³/m³].
+        pub damping_curve: [R; 2],
         /// Proportional gain, 0 in velocity mode [N·m/rad or N/m].
         pub ke: R,
         /// Derivative gain [N·m·s/rad or N·s/m].

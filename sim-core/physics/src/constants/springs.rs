@@ -27,7 +27,7 @@ impl<R> Default for Springs<R> {
 }
 
 recast! {
-    /// A spring of a dof with one coordinate: the force is -stiffness (q - rest).
+    /// A spring of a dof with one coordinate: the force is -(stiffness + a x + b x²) x with x = q - rest.
     #[derive(Clone, Debug)]
     pub struct Spring<R> {
         /// The dof.
@@ -36,6 +36,8 @@ recast! {
         pub stiffness: R,
         /// Position without force [rad or m].
         pub rest: R,
+        /// a and b, by which its stiffness grows with the stretch and its square [N·m/rad², N·m/rad³ or N/m², N/m³].
+        pub curve: [R; 2],
     }
 }
 
@@ -51,6 +53,8 @@ recast! {
         pub position: [R; 3],
         /// Rotation without torque, (x, y, z, w) [–].
         pub quat: [R; 4],
+        /// a and b, by which both grow with the distance from rest and its square [N/m², N/m³ and N·m/rad², N·m/rad³].
+        pub curve: [R; 2],
     }
 }
 
@@ -68,5 +72,9 @@ recast! {
         pub damping: R,
         /// [kg or kg·m²]
         pub armature: R,
+        /// By which its stiffness grows with the stretch and its square [N/m², N/m³ or N·m/rad², N·m/rad³].
+        pub stiffness_curve: [R; 2],
+        /// By which its damping grows with the speed and its square [N·s²/m², N·s³/m³ or N·m·s²/rad², N·m·s³/rad³].
+        pub damping_curve: [R; 2],
     }
 }

@@ -5,10 +5,10 @@
 //! smooth = joint_f + drive - damping q̇ - bias + Σ Jᵀ body_f
 //! ```
 //!
-//! The target of a ball is a rotation vector. Its error is the rotation vector from the present rotation to the target.
+//! A joint's damping may grow with its speed ([`super::curves`]). The target of a ball is a rotation vector. Its error is the rotation vector from the present rotation to the target.
 
 use super::command::{Kind, command_of};
-use super::link_forces;
+use super::{link_forces, springs};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::params::Param;
 use crate::constants::{Body, Constants, Motion};
@@ -74,9 +74,10 @@ fn smooth_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     }
     // damping of joints is passive: the effort limit does not clamp it. `springs` has that of free joints
     for &j in &m.diagonal_dofs {
-        let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
+        let qd = cx.get(&b.joint_qd[j]);
+        let damping = springs::joint_damping(m, &b.params, j, qd);
         let force = &mut b.work.smooth_force[j];
-        *force = cx.get(&b.joint_qd[j]).fnma(damping, *force);
+        *force = qd.fnma(damping, *force);
     }
     // the bias: Coriolis, centrifugal and gravity forces
     for (force, bias) in b.work.smooth_force.iter_mut().zip(&b.work.bias_force) {

@@ -1,19 +1,20 @@
 //! Damping of actuators and tendons in an implicit step (MuJoCo: `mjd_actuator_vel`, `mjd_passive_vel`).
 //!
 //! ```text
-//! M += Jᵀ (-h ∂f/∂v) J                   J: moments of the length along which f acts
+//! M += Jᵀ (-h ∂f/∂v) J                   J: moments of the length along which f acts; of tendons as in [`super::curves`]
 //! ```
 //!
 //! As in MuJoCo, dofs of different branches of a tree do not damp each other.
 
 use super::actuators::{force_range, input};
-use super::muscles;
+use super::{curves, muscles};
 use crate::arrays::Workspace;
 use crate::constants::lengths::Term;
 use crate::constants::params::Param;
 use crate::constants::{Constants, Motion};
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::vec3::Vec3;
+use crate::step::lengths::rate;
 use crate::step::{BlockOf, ConstantsOf, param};
 
 /// Adds the damping of actuators and tendons to the mass matrix, and its right-hand side to `acceleration`.
@@ -55,10 +56,17 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
             subtract_swing(cx, m, b, &length.dofs, moments, damping);
         }
     }
-    // M += Jᵀ (h damping) J of tendons
-    let damped = m.springs.tendons.iter();
-    for tendon in damped.filter(|tendon| tendon.damping.to_f64() != 0.0) {
-        let damping = C::F::k(tendon.damping) * dt;
+    // M += Jᵀ (h (d + 2 a |v| + 3 b v²)) J of tendons
+    for tendon in &m.springs.tendons {
+        let curve = tendon.damping_curve;
+        if tendon.damping.to_f64() == 0.0 && !curves::bends(curve) {
+            continue;
+        }
+        let mut damping = C::F::k(tendon.damping);
+        if curves::bends(curve) {
+            damping = curves::slope(damping, curve, rate(cx, b, &tendon.length));
+        }
+        let damping = damping * dt;
         add_product(m, &mut b.work.mass_matrix, &tendon.length.terms, damping);
         if let Some(tendon) = tendon.length.tendon {
             let tendon = &m.tendons[tendon];

@@ -9,6 +9,7 @@
 //! | `damping` | damping of actuators and tendons in an implicit step |
 //! | `muscles` | gain, bias and activation of muscles |
 //! | `springs` | springs and dampers of joints and tendons |
+//! | `curves` | their stiffness and damping where these are polynomials |
 //! | `fluid`, `ellipsoid_fluid` | forces of the medium: on links, on geoms that count as ellipsoids |
 //! | `gravity_compensation` | links that are held against gravity |
 //! | `link_forces` | forces on links, as forces on joints |
@@ -17,6 +18,7 @@ pub mod actuation;
 pub mod actuators;
 pub mod adhesion;
 pub mod command;
+pub(in crate::step) mod curves;
 pub mod damping;
 pub mod ellipsoid_fluid;
 pub mod fluid;

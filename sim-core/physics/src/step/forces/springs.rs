@@ -7,15 +7,15 @@
 //! passive = the same - damping q̇                       for output
 //! ```
 //!
-//! A free joint's spring acts at the origin of its frame ([`crate::step::tree::free_joints`]).
+//! Stiffness and damping may be polynomials ([`super::curves`]). A free joint's spring acts at the origin of its frame ([`crate::step::tree::free_joints`]).
 
-use super::{fluid, gravity_compensation};
+use super::{curves, fluid, gravity_compensation};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::Motion;
 use crate::constants::params::Param;
 use crate::constants::springs::{PoseSpring, Tendon};
-use crate::lane::{Cx, Num, Real, map};
+use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
 use crate::step::lengths::{length, moments, rate};
@@ -86,8 +86,8 @@ impl Stage for Passive {
         passive.fill(C::F::c(0.0));
         // -damping q̇ of joints, which `actuation` adds in a step
         for &j in &m.diagonal_dofs {
-            let damping = param(m, &b.params, Param::JointDamping, j, m.dofs[j].damping);
-            passive[j] = -(cx.get(&b.joint_qd[j]) * damping);
+            let qd = cx.get(&b.joint_qd[j]);
+            passive[j] = -(qd * joint_damping(m, &b.params, j, qd));
         }
         add_springs(cx, m, b, &mut passive);
         // without Tᵀ A c: armature is no passive force
@@ -109,22 +109,39 @@ impl Stage for Passive {
     }
 }
 
+/// Damping of a dof at a velocity: d + a |q̇| + b q̇², with the d of the world.
+#[inline(always)]
+pub(in crate::step) fn joint_damping<F: Num>(
+    m: &Constants<F::Real>,
+    params: &[F],
+    j: usize,
+    qd: F,
+) -> F {
+    let dof = &m.dofs[j];
+    let damping = param(m, params, Param::JointDamping, j, dof.damping);
+    curves::curved(damping, dof.damping_curve, qd.abs())
+}
+
 /// Adds the forces of springs, and of springs and dampers of tendons.
 #[inline(always)]
 fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
     // -stiffness (q - rest)
     for spring in &m.springs.joints {
         let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+        let stiffness = curves::curved(C::F::k(spring.stiffness), spring.curve, stretch);
         let force = &mut to[spring.dof];
-        *force = stretch.fnma(C::F::k(spring.stiffness), *force);
+        *force = stretch.fnma(stiffness, *force);
     }
     // stretch, and the rate v of the length
     for tendon in &m.springs.tendons {
         let stretch = stretch(cx, m, b, tendon);
         let velocity = rate(cx, b, &tendon.length);
         // stiffness stretch + damping v, on each joint times its moment
-        let damped = velocity * C::F::k(tendon.damping);
-        let pull = stretch.fma(C::F::k(tendon.stiffness), damped);
+        let damping = C::F::k(tendon.damping);
+        let damping = curves::curved(damping, tendon.damping_curve, velocity.abs());
+        let stiffness = C::F::k(tendon.stiffness);
+        let stiffness = curves::curved(stiffness, tendon.stiffness_curve, stretch);
+        let pull = stretch.fma(stiffness, velocity * damping);
         moments::<C>(m, &b.work.ten_moment, &tendon.length, |dof, moment| {
             to[dof] = pull.fnma(moment, to[dof]);
         });
@@ -132,8 +149,9 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
     // stiffness times the slide and the rotation vector from rest
     for spring in &m.springs.poses {
         let body = &m.bodies[spring.body];
-        let stiffness = C::F::k(spring.stiffness);
-        let [slide, turn] = map(pose_stretch(cx, m, b, spring), |x| x * stiffness);
+        let [mut slide, mut turn] = pose_stretch(cx, m, b, spring);
+        slide = slide * pose_stiffness(spring, slide);
+        turn = turn * pose_stiffness(spring, turn);
         let (rotation, origin) = (b.work.rotation[spring.body], b.work.origin[spring.body]);
         let force = &mut to[body.dofs()];
         // at the frame's origin, the torque in the body's axes
@@ -170,6 +188,17 @@ pub(in crate::step) fn pose_stretch<C: Cx>(
     let here = read_quat(cx, &b.joint_q, first);
     let rest = quat::constant(spring.quat);
     [slide, quat::log(mul(conjugate(rest), here))]
+}
+
+/// k + a |x| + b |x|² of a spring of a ball or a free joint.
+#[inline(always)]
+fn pose_stiffness<F: Num>(spring: &PoseSpring<F::Real>, x: Vec3<F>) -> F {
+    let stiffness = F::k(spring.stiffness);
+    // without a and b the length is not needed
+    if !curves::bends(spring.curve) {
+        return stiffness;
+    }
+    curves::curved(stiffness, spring.curve, x.dot(x).sqrt())
 }
 
 /// How far a tendon is beyond its rests.

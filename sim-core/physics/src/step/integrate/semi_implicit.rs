@@ -4,6 +4,8 @@
 //! (M + h diag(damping + kd)) q̈' = smooth + constraint        q̇ += h q̈'        q += h q̇
 //! ```
 //!
+//! Damping that grows with the speed counts with its derivative ([`crate::step::forces::curves`]).
+//!
 //! In `f32` the rounding error of q + h q̇ is kept and added to the next step (compensated summation, Kahan 1965). Without it an
 //! arm that moves by less than half a rounding of its angle per step would stand still with a velocity, and slip on an object
 //! that it holds.
@@ -33,7 +35,7 @@ use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::forces::{actuators, damping, ellipsoid_fluid, fluid};
+use crate::step::forces::{actuators, curves, damping, ellipsoid_fluid, fluid};
 use crate::step::tree::free_joints;
 use crate::step::tree::generalized::keep_accelerations;
 use crate::step::tree::kinematics::read_quat;
@@ -50,6 +52,7 @@ impl Stage for Integrate {
         A::ActDot,
         A::ActuatorMoment,
         A::TenMoment,
+        A::TenVelocity,
         A::ActuatorLength,
         A::ActuatorVelocity,
         A::ActuatorForce,
@@ -142,6 +145,7 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
         let dof = &m.dofs[j];
         // a clamped drive keeps its damping here, as under MuJoCo's `actfrcrange`
         let mut damping = param(m, &b.params, Param::JointDamping, j, dof.damping);
+        damping = curves::slope(damping, dof.damping_curve, cx.get(&b.joint_qd[j]));
         // nothing drives a free body
         if m.bodies[dof.body].motion != Motion::Free {
             damping = damping + param(m, &b.params, Param::JointTargetKd, j, dof.kd);

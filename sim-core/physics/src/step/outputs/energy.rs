@@ -4,12 +4,13 @@
 //! E_kin = ½ q̇ᵀ M q̇          E_pot = - Σ g · m c + Σ ½ k (q - rest)²       c a body's centre of mass in the world
 //! ```
 //!
-//! After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - point) has all bodies.
+//! A spring whose stiffness is a polynomial has the energy of [`crate::step::forces::curves`]. After the mass matrix, a root's inertia is that of its whole tree: its first moment h = m (c - point) has all bodies.
 //! What stands still has no part in either, as where MuJoCo fuses static bodies.
 
 use crate::arrays::Array as A;
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::multiply;
+use crate::step::forces::curves;
 use crate::step::forces::springs::{pose_stretch, stretch};
 use crate::step::{BlockOf, ConstantsOf, Stage, gravity};
 
@@ -57,20 +58,25 @@ impl Stage for Energy {
         // ½ k (q - rest)² of springs of joints
         for spring in &m.springs.joints {
             let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
-            let half = C::F::c(0.5 * spring.stiffness.to_f64());
+            let half = curves::energy(spring.stiffness, spring.curve, stretch);
             potential = (stretch * half).fma(stretch, potential);
         }
         // ½ k x² of tendons, with x the length outside of their two rests
         for tendon in &m.springs.tendons {
             let stretch = stretch(cx, m, b, tendon);
-            let half = C::F::c(0.5 * tendon.stiffness.to_f64());
+            let half = curves::energy(tendon.stiffness, tendon.stiffness_curve, stretch);
             potential = (stretch * half).fma(stretch, potential);
         }
         // ½ k |x|² of balls and free joints, of the displacement and of the rotation vector
         for spring in &m.springs.poses {
-            let half = C::F::c(0.5 * spring.stiffness.to_f64());
             for stretch in pose_stretch(cx, m, b, spring) {
-                potential = half.fma(stretch.dot(stretch), potential);
+                let square = stretch.dot(stretch);
+                let mut half = C::F::c(0.5 * spring.stiffness.to_f64());
+                // ½ k + ⅓ a |x| + ¼ b |x|²
+                if curves::bends(spring.curve) {
+                    half = curves::energy(spring.stiffness, spring.curve, square.sqrt());
+                }
+                potential = half.fma(square, potential);
             }
         }
         b.work.potential_energy[0] = potential;

@@ -8,6 +8,7 @@
 //! M += Tᵀ A T        smooth -= Tᵀ (A c + D T v)
 //! ```
 //!
+//! D may grow with the entries of v' ([`crate::step::forces::curves`]): in the force with v', below with its derivative.
 //! A step that is implicit in damping solves (M + h TᵀDT) a = τ + Jᵀf - h TᵀD c. For a free body that carries nothing,
 //! `implicitfast` adds h N, the change of its bias force with the velocity in MuJoCo's coordinates. With mass m, first moment
 //! p, second moment I and S(α) = ω × (α × r) + α × (ω × r), r = -o:
@@ -19,9 +20,10 @@
 use crate::arrays::{Block, Workspace};
 use crate::constants::Constants;
 use crate::constants::params::Param;
-use crate::lane::{Cx, Num, map};
+use crate::lane::{Cx, Num};
 use crate::math::spatial::Inertia;
 use crate::math::vec3::Vec3;
+use crate::step::forces::curves;
 use crate::step::{BlockOf, ConstantsOf, param};
 
 /// Armature or damping of the dofs of a free body, linear and angular, in MuJoCo's velocities.
@@ -96,9 +98,17 @@ pub(in crate::step) fn add_damping_forces<C: Cx>(
         }
         let velocity = spin.cross_add(origin, velocity);
         // D v', the angular part in the body's axes
-        let [linear, angular] = of_dofs(m, &b.params, Param::JointDamping, body);
+        let turning = rotation.transpose_mul(spin);
+        let [mut linear, mut angular] = of_dofs(m, &b.params, Param::JointDamping, body);
+        // d + a |v'| + b v'²
+        for i in 0..3 {
+            let slide = m.dofs[first + i].damping_curve;
+            let turn = m.dofs[first + 3 + i].damping_curve;
+            linear[i] = curves::curved(linear[i], slide, velocity[i].abs());
+            angular[i] = curves::curved(angular[i], turn, turning[i].abs());
+        }
         let force = scaled(linear, velocity);
-        let torque = scaled(angular, rotation.transpose_mul(spin));
+        let torque = scaled(angular, turning);
         subtract(&mut to[first..first + 6], [force, torque], rotation, origin);
     }
 }
@@ -200,11 +210,21 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Bl
     let dt = C::F::k(m.dt);
     for &body in &m.free_joints {
         let first = m.bodies[body].dof;
-        // h D, whose Tᵀ D T is no diagonal
-        let damping = map(of_dofs(m, &b.params, Param::JointDamping, body), |x| x * dt);
+        let [mut linear, mut angular] = of_dofs(m, &b.params, Param::JointDamping, body);
         let spin = spin(cx, b, first);
+        let (rotation, origin) = (b.work.rotation[body], b.work.origin[body]);
+        // D as the derivative of D v', at v' = v + ω × o and ω' = Rᵀ ω
+        let (turning, swing) = (rotation.transpose_mul(spin), spin.cross(origin));
+        for i in 0..3 {
+            let velocity = cx.get(&b.joint_qd[first + i]) + swing[i];
+            let slide = m.dofs[first + i].damping_curve;
+            let turn = m.dofs[first + 3 + i].damping_curve;
+            linear[i] = curves::slope(linear[i], slide, velocity);
+            angular[i] = curves::slope(angular[i], turn, turning[i]);
+        }
+        // h D, whose Tᵀ D T is no diagonal
+        let damping = [linear * dt, angular * dt];
         let w = &mut b.work;
-        let (rotation, origin) = (w.rotation[body], w.origin[body]);
         // on the left h Tᵀ D T, on the right -h Tᵀ D c
         add_block(m, w, body, damping);
         let force = scaled(damping[0], spin.cross(spin.cross(origin)));
