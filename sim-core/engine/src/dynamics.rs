@@ -90,7 +90,8 @@ impl Dynamics {
     /// Joint forces that give the accelerations `joint_qdd`: `M q̈ + c`, and `+ d q̇` with `damping`. `(states, dofs)`
     /// [N·m or N]
     ///
-    /// M has the armature in it, c is [`Field::BiasForce`], d the joint's damping at its speed. Drives, dry friction, limits, mimic
+    /// M has the armature in it, c is [`Field::BiasForce`], d the joint's damping at its speed. Damping of a free joint
+    /// is exact where it is linear and the centre of mass is the origin of the frame. Drives, dry friction, limits, mimic
     /// joints and contacts are left out. `joint_qd` and `joint_qdd` are `(states, dofs)`, or empty for zeros. Sent as
     /// `joint_f`, the result makes a joint without these accelerate by `joint_qdd`.
     ///

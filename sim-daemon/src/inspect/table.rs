@@ -36,9 +36,16 @@ pub(super) fn dofs(properties: &Properties) -> String {
         .map(|index| &robot.joints[index])
         .flat_map(|joint| joint.dofs.iter().map(move |dof| (joint, dof)))
         .collect();
-    let (given, absent): (Vec<Column>, Vec<Column>) = COLUMNS
-        .into_iter()
-        .partition(|(_, value)| dofs.iter().any(|(joint, dof)| value(joint, dof).is_some()));
+    // damping that grows with the speed is shown at rest, also where it is 0 there
+    let grows = robot.precompiled.as_ref().is_some_and(|parts| {
+        let mut joints = parts.joints.iter();
+        joints.any(|joint| joint.damping_curves != [[0.0; 2]; 6])
+    });
+    let (given, absent): (Vec<Column>, Vec<Column>) =
+        COLUMNS.into_iter().partition(|(heading, value)| {
+            let is_given = dofs.iter().any(|(joint, dof)| value(joint, dof).is_some());
+            is_given || (grows && *heading == "damping")
+        });
     let mut rows = vec![heading(&given)];
     for (index, ((joint, dof), name)) in dofs.iter().zip(&names).enumerate() {
         let range = joint.range.map(|range| range.map(short));

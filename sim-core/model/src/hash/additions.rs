@@ -9,7 +9,7 @@ use sim_physics::constants::actuators::{
 use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
 use sim_physics::constants::lengths::{Length, Term};
 use sim_physics::constants::options::{Integrator, Search};
-use sim_physics::constants::outputs::{OutputBody, OutputFrames};
+use sim_physics::constants::outputs::{OutputBody, OutputFrames, OutputTendon};
 use sim_physics::constants::passive::{Compensation, Drag, FluidGeom, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
 use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon};
@@ -309,7 +309,9 @@ view! {
         };
     OutputFrames<f64> as "MujocoFrames":
         Always { "bodies": bodies, "sites": sites, "geoms": geoms }
-        => tendons;
+        Never { "tendons": tendons };
+    OutputTendon<f64> as "OutputTendon":
+        Always { "length": length, "idle": idle };
     OutputBody<f64> as "MujocoBody":
         Always {
             "link": link,

@@ -151,8 +151,8 @@ impl ModelFile {
         Ok(all.as_chunks::<N>().0.to_vec())
     }
 
-    /// How stiffness or damping grows, two numbers a row; all are 0 where this version of MuJoCo has no such array, or the
-    /// option that `is_off` stands for switches it off.
+    /// How stiffness or damping grows, two numbers a row. All are 0 where MuJoCo has no such array, or where `is_off` says that
+    /// an option switches it off.
     pub fn curves(
         &self,
         name: &str,

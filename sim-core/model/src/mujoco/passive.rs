@@ -32,8 +32,8 @@ pub(super) fn compensations(
 /// Least mass of a link on which the medium acts (MuJoCo: `mjMINVAL`) [kg].
 const MASS_MIN: f64 = 1e-15;
 
-/// Share of the forces of a geom as an ellipsoid, blunt, slender and angular drag, lift after Kutta and Magnus, then the volumes
-/// that move along with it and turn with it: a row of `geom_fluid`.
+/// Numbers in a row of `geom_fluid`: whether it acts; blunt, slender and angular drag; lift after Kutta and Magnus; added mass
+/// (3); added moments (3).
 const FLUID_COLUMNS: usize = 12;
 
 /// Does the medium act on anything?

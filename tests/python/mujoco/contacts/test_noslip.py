@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import mujoco
 import numpy as np
 import pytest
@@ -75,7 +73,7 @@ def test_accelerations_and_motion_are_mujocos(cone, condim, options):
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 @pytest.mark.parametrize("condim", [3, 6])
-def test_single_precision_is_double_s(cone, condim):
+def test_single_precision_is_near_double(cone, condim):
     worlds = 21
     found = []
     # the rim of a cylinder that nearly stands is lost in single precision, with sweeps or without
@@ -109,7 +107,7 @@ def test_a_world_alone_has_the_bits_of_the_same_world_among_others(cone):
             np.testing.assert_array_equal(alone.qpos[0], among[world])
 
 
-def test_a_box_on_a_slope_creeps_no_more():
+def test_a_box_on_a_slope_stops_creeping():
     slope = """<mujoco><option gravity="3 0 -9.3" noslip_iterations="{sweeps}" cone="elliptic"/><worldbody>
       <geom type="plane" size="9 9 .1"/><body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
       </worldbody></mujoco>"""
@@ -122,7 +120,7 @@ def test_a_box_on_a_slope_creeps_no_more():
                 after = case.sim.step().qpos[0, 0]
             crept.append(after - before)
     assert crept[0] > 1e-3
-    assert all(0.01 * more > less for more, less in pairwise(crept[:2])) and abs(crept[2]) < 1e-6
+    assert max(abs(crept[1]), abs(crept[2])) < 1e-6
 
 
 def test_a_gpu_refuses_and_a_model_without_sweeps_runs():

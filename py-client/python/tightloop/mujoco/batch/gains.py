@@ -40,13 +40,18 @@ def factors(model: Any, name: str, values: Array) -> Array:
     return np.where(reads, values[..., :3].astype(np.float64), 0.0)
 
 
-def changed_muscles(model: Any, name: str, values: Array) -> Array:
-    """Return which numbers of muscles are other ones than in the model, ``(n, nu, 10)``.
+def inexpressible(model: Any, name: str, values: Array) -> Array:
+    """Return which numbers no parameter expresses, ``(n, nu, 10)``: changed ones of muscles, velocities of adhesions.
 
     Args:
         model: The model.
         name: ``actuator_gainprm`` or ``actuator_biasprm``.
         values: Its values, ``(n, nu, 10)``.
     """
-    muscles = np.asarray(getattr(model, _LAWS[name][0])) == _MUSCLES[name]
-    return (values != np.asarray(getattr(model, name)).astype(values.dtype)) & muscles[:, None]
+    kind, _, affine = _LAWS[name]
+    kinds = np.asarray(getattr(model, kind))
+    changed = values != np.asarray(getattr(model, name)).astype(values.dtype)
+    wrong = changed & (kinds == _MUSCLES[name])[:, None]
+    adhesions = (np.asarray(model.actuator_trntype) == mujoco.mjtTrn.mjTRN_BODY) & (kinds == affine)
+    wrong[..., 2] |= adhesions & (values[..., 2] != 0)
+    return wrong

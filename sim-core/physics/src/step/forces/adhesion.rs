@@ -67,6 +67,10 @@ fn sum_normals<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, body: 
     let mut count = cx.var(zero);
     let t = &m.contacts;
     for (number, class) in t.classes.iter().enumerate() {
+        // MuJoCo has no contact between bodies that nothing moves, such as a mocap body and the ground
+        if class.columns.is_empty() {
+            continue;
+        }
         // only classes with a contact of the body, which is one of those that they act on
         let bodies = t.bodies.of_classes.get(number);
         let place = bodies.and_then(|bodies| bodies.iter().position(|&other| other == body));

@@ -233,7 +233,7 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &C, m: &ConstantsOf<C>, b: &mut Bl
     }
 }
 
-/// The system (H + h N) a = b of a free body, H its block of the mass matrix and b its part of `acceleration`, in column 6.
+/// The system (H + h N) a = b of a free body. H is its block of the mass matrix; b, in column 6, its part of `acceleration`.
 #[inline(always)]
 pub(in crate::step) fn system<C: Cx>(
     cx: &C,

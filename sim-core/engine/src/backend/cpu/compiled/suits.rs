@@ -38,13 +38,17 @@ pub(super) fn suits(m: &Constants<f64>) -> bool {
 /// What a bend of a tendon around a shape counts: its code is as long as that of so many joints [–].
 const BEND_PARTS: usize = 8;
 
-/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, and commands that wait in each dof.
+/// The same of a geom that counts as an ellipsoid in a medium [–].
+const FLUID_PARTS: usize = 8;
+
+/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, geoms in a medium, and commands that wait in each dof.
 fn parts(m: &Constants<f64>) -> usize {
     let commands = m.delay.frames * m.dofs.len();
     let spans = m.tendons.iter().flat_map(|tendon| &tendon.spans);
     let spans = spans.map(|span| 1 + BEND_PARTS * usize::from(span.wrap.is_some()));
     let tendons: usize = spans.sum();
-    m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len() + tendons + commands
+    let fluid = FLUID_PARTS * m.fluid_geoms.len();
+    m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len() + tendons + fluid + commands
 }
 
 /// Runs of stages that are compiled, as long as they can be, by their places in a substep.

@@ -75,7 +75,8 @@ pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>
     let y = b.axes[1] * half[1];
     let z = b.axes[2] * half[2];
     if pair.ordered_corners {
-        // all eight, x first; those above the centre are left out
+        // all eight, x first; those above the centre are left out, and all after the fourth that touches
+        let mut left = C::F::c(4.0);
         for corner in 0..8 {
             let along = |axis: Vec3<C::F>, bit: usize| match corner & bit {
                 0 => axis * C::F::c(-1.0),
@@ -83,8 +84,10 @@ pub fn plane_box<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>
             };
             let corner = along(x, 1) + (along(y, 2) + along(z, 4));
             let above = normal.dot(corner);
-            let far = C::F::c(0.0).lt(above);
+            let far = C::F::c(0.0).lt(above) | left.lt(C::F::c(0.5));
             let distance = C::F::select(far, pair.margin, height + above);
+            let touches = distance.lt(pair.margin);
+            left = left - C::F::select(touches, C::F::c(1.0), C::F::c(0.0));
             add_plane_contact(cx, pair, b.center + corner, distance, out);
         }
         return;

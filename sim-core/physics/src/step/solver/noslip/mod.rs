@@ -1,4 +1,4 @@
-//! Forces of friction that let nothing creep (MuJoCo documentation, "Solver parameters: noslip"; `mj_solNoSlip`).
+//! Forces of friction that stop slow slip (MuJoCo documentation, "Solver parameters: noslip"; `mj_solNoSlip`).
 //!
 //! The solver softens each row by R = 1/D, so bodies that rub slip a little under load. Sweeps over the rows of friction find
 //! the forces without R, while all other forces stay. They minimise the dual cost, row by row (projected Gauss-Seidel):
@@ -135,7 +135,7 @@ impl Part {
     }
 }
 
-/// Factors M into `hessian`. In `f64` a becomes M⁻¹ (τ + Jᵀ f), as exactly as MuJoCo has it; in `f32` it keeps the digits that
+/// Factors M into `hessian`. In `f64` a becomes M⁻¹ (τ + Jᵀ f), as exactly as MuJoCo has it. In `f32` it keeps the digits that
 /// the solver and its refinement gave it.
 #[inline(always)]
 fn factor<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {

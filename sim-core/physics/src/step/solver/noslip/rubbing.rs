@@ -4,8 +4,9 @@
 //! are found, so a sweep goes from pair to pair by their ranks.
 
 use super::{Part, cone, pyramid};
-use crate::constants::contact::{Cone, row, turning};
+use crate::constants::contact::{Class, Cone, row, turning};
 use crate::lane::{Cx, Num};
+use crate::math::factor::substitute;
 use crate::step::constraints::contact_rows::class_list;
 use crate::step::solver::contacts::{ClassOf, ContactsOf};
 use crate::step::{BlockOf, ConstantsOf};
@@ -80,22 +81,17 @@ fn rank_of<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, r: C::I) -> C::F {
 
 /// Directions of friction of a class: the tangents, and three rotations.
 #[inline(always)]
-pub(super) fn directions<R>(class: &crate::constants::contact::Class<R>) -> usize {
+pub(super) fn directions<R>(class: &Class<R>) -> usize {
     match class.turns {
         Some(_) => 5,
         None => 2,
     }
 }
 
-/// Where a direction's scalars are: the place in a row, `first` being that of the normal in the first block and `more` that of
-/// the first rotation in the second.
+/// The place of a direction's scalar in a row. `first` is that of the normal, `more` that of the first rotation in the second
+/// block.
 #[inline(always)]
-pub(super) fn place<R>(
-    class: &crate::constants::contact::Class<R>,
-    direction: usize,
-    first: usize,
-    more: usize,
-) -> usize {
+pub(super) fn place<R>(class: &Class<R>, direction: usize, first: usize, more: usize) -> usize {
     match (direction, class.turns) {
         (0 | 1, _) => first + 1 + direction,
         (_, Some(block)) => block + more + direction - 2,
@@ -139,7 +135,7 @@ pub(super) fn write_step<C: Cx>(
     for (c, column) in class.columns.iter().enumerate() {
         step[column.dof] = cx.load(m.contacts.memory.rows, r, at + 3 * c);
     }
-    crate::math::factor::substitute(&m.pattern, &w.hessian, step);
+    substitute(&m.pattern, &w.hessian, step);
 }
 
 /// J a - aref of a direction, and its products with the steps of the directions up to it: a row of A.
