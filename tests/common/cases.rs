@@ -44,7 +44,7 @@ struct Near {
 }
 
 /// All of them.
-pub fn cases() -> [Case; 12] {
+pub fn cases() -> [Case; 13] {
     [
         fr3(),
         every_joint(),
@@ -57,6 +57,7 @@ pub fn cases() -> [Case; 12] {
         mujoco("implicit"),
         mujoco("runge_kutta"),
         sensors(),
+        passive(),
         fields(),
     ]
 }
@@ -74,6 +75,17 @@ pub fn mujoco(name: &'static str) -> Case {
 pub fn sensors() -> Case {
     let case = of_mujoco("sensors");
     assert!(case.m.sensors.all.len() > 40 && case.m.sensors.records > 1);
+    case
+}
+
+/// Springs and dampers that are no lines, geoms as ellipsoids in a medium, adhesion and an idle tendon.
+pub fn passive() -> Case {
+    let case = of_mujoco("passive");
+    let m = &case.m;
+    assert!(!m.fluid_geoms.is_empty() && !m.solved_bodies.is_empty());
+    assert!(
+        !m.actuators.adhesions.is_empty() && m.outputs.tendons.iter().any(|t| t.idle.is_some())
+    );
     case
 }
 

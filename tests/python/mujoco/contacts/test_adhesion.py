@@ -150,3 +150,17 @@ def test_what_is_not_supported_is_refused_by_name(actuator, reason):
     </worldbody><actuator>{actuator}</actuator></mujoco>"""
     with pytest.raises(tl.SceneError, match=f"actuator `a`: no support for .*{reason}"):
         tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml))
+
+
+def test_contacts_of_a_mocap_pad_with_what_stands_still_do_not_count():
+    xml = """<mujoco><worldbody><geom type="plane" size="9 9 .1"/>
+      <body name="pad" mocap="true" pos="0 0 .095"><geom type="box" size=".1 .1 .1"/></body>
+      <body pos="0 0 .29"><freejoint/><geom size=".1"/></body></worldbody>
+      <actuator><adhesion body="pad" ctrlrange="0 1" gain="12"/></actuator></mujoco>"""
+    with live(xml, worlds=1, fields=("qfrc_actuator",)) as case:
+        data = mujoco.MjData(case.model)
+        data.ctrl[:] = 1.0
+        mujoco.mj_forward(case.model, data)
+        assert data.ncon == 1 and data.qfrc_actuator[2] == -12.0
+        frame = case.sim.write(ctrl=[[1.0]])
+        np.testing.assert_allclose(frame.qfrc_actuator[0], data.qfrc_actuator, rtol=0, atol=1e-9)

@@ -138,3 +138,77 @@ def test_a_gpu_refuses_and_a_model_without_sweeps_runs():
             frame = sim.step()
             mujoco.mj_step(plain, data)
         assert relative(frame.qpos[0], data.qpos) < 1e-6
+
+
+@pytest.mark.parametrize("integrator", ["implicitfast", "RK4"])
+def test_other_integrators_sweep(integrator):
+    model = mujoco.MjModel.from_xml_string(model_of("pyramidal", 4))
+    model.opt.integrator = mujoco.mjtIntegrator.__members__[f"mjINT_{integrator}".upper()]
+    with live(model, worlds=2) as case:
+        states = case.states(3, spread=0.004, speed=0.3)
+        case.place(states)
+        own = list(case.data(states))
+        for _ in range(50):
+            frame = case.sim.step()
+            for data in own:
+                mujoco.mj_step(case.model, data)
+        for world, data in enumerate(own):
+            assert relative(frame.qpos[world], data.qpos) < 1e-6, world
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_worlds_have_frictions_and_softness_of_their_own(cone):
+    params = ("joint_friction", "shape_mu", "shape_solref", "shape_solimp")
+    with live(model_of(cone), worlds=4, params=params) as case:
+        states = case.states(3, spread=0.004, speed=0.3)
+        factors = np.array([0.3, 1.0, 1.7, 2.5])
+        values = {name: getattr(case.sim.params, name).copy() for name in params}
+        values["joint_friction"] *= factors[:, None]
+        values["shape_mu"] *= factors[:, None]
+        values["shape_solref"][..., 0] *= factors[:, None]
+        values["shape_solimp"][..., :2] *= 0.96 ** factors[:, None, None]
+        case.sim.set_params(**values)
+        frame = case.place(states)
+        m = case.model
+        kept = m.dof_frictionloss.copy(), m.geom_friction.copy(), m.geom_solref.copy(), m.geom_solimp.copy()
+        for world, data in enumerate(case.data(states)):
+            m.dof_frictionloss[:] = kept[0] * factors[world]
+            m.geom_friction[:] = kept[1] * factors[world]
+            m.geom_solref[:] = kept[2]
+            m.geom_solref[:, 0] *= factors[world]
+            m.geom_solimp[:] = kept[3]
+            m.geom_solimp[:, :2] *= 0.96 ** factors[world]
+            mujoco.mj_forward(m, data)
+            assert relative(frame.qacc[world], data.qacc) < 1e-8, world
+
+
+def test_two_models_in_a_scene_are_swept_as_each_alone():
+    xml = """<mujoco><option noslip_iterations="{sweeps}" noslip_tolerance="0"/><worldbody>
+      <body name="thing" pos="{x} 0 .098"><freejoint/><geom type="box" size=".2 .1 .1"/></body>{floor}
+      </worldbody></mujoco>"""
+    floor = '<geom type="plane" size="9 9 .1"/>'
+    single = [xml.format(sweeps=4, x=x, floor=floor) for x in (0, 2)]
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(single[0]), name="a")
+    scene.add_mujoco(mujoco.MjModel.from_xml_string(xml.format(sweeps=2, x=2, floor="")), name="b")
+    rng = np.random.default_rng(0)
+    speeds = rng.normal(0, 0.5, (2, 6))
+    with tl.launch(scene, worlds=1, precision="f64", fields=("qacc", "qvel", "qpos")) as sim:
+        q, qd = sim.forward().joint_q.copy(), np.zeros((1, 12))
+        qd[0, :6], qd[0, 6:] = speeds
+        frame = sim.write(joint_q=q, joint_qd=qd)
+        for k, text in enumerate(single):
+            model = mujoco.MjModel.from_xml_string(text)
+            data = mujoco.MjData(model)
+            data.qvel[:] = speeds[k]
+            mujoco.mj_forward(model, data)
+            assert relative(frame.qacc[0, 6 * k : 6 * k + 6], data.qacc) < 1e-8, k
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_a_box_that_stands_on_an_edge_has_four_corners_at_most(precision):
+    xml = """<mujoco><option noslip_iterations="3"/><worldbody><geom type="plane" size="9 9 .1"/>
+      <body pos="0 0 -.01" euler="45 0 0"><freejoint/><geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
+    with live(xml, worlds=1, precision=precision, fields=("contact_count",)) as case:
+        frame = case.sim.forward()
+        assert frame.contact_count[0] == 4
+        assert not frame.status.any()

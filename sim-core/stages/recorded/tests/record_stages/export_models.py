@@ -21,3 +21,4 @@ for name, (integrator, cone) in OPTIONS.items():
     export.export(model, FOLDER / f"{name}.safetensors")
 
 export.export(FOLDER / "every_sensor.xml", FOLDER / "sensors.safetensors")
+export.export(FOLDER / "every_passive.xml", FOLDER / "passive.safetensors")
