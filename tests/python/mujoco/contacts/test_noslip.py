@@ -167,7 +167,7 @@ def test_worlds_have_frictions_and_softness_of_their_own(cone):
         values["shape_mu"] *= factors[:, None]
         values["shape_solref"][..., 0] *= factors[:, None]
         values["shape_solimp"][..., :2] *= 0.96 ** factors[:, None, None]
-        case.sim.set_params(**values)
+        case.sim.params.write(**values)
         frame = case.place(states)
         m = case.model
         kept = m.dof_frictionloss.copy(), m.geom_friction.copy(), m.geom_solref.copy(), m.geom_solimp.copy()
