@@ -151,7 +151,7 @@ impl ModelFile {
         Ok(all.as_chunks::<N>().0.to_vec())
     }
 
-    /// How stiffness or damping grows, two numbers a row. All are 0 where MuJoCo has no such array, or where `is_off` says that
+    /// How stiffness or damping grows, two numbers per row. All are 0 where MuJoCo has no such array, or where `is_off` says that
     /// an option switches it off.
     pub fn curves(
         &self,
