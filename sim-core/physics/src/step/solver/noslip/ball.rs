@@ -117,7 +117,14 @@ pub(super) fn least<C: Cx>(cx: &mut C, problem: &Problem<C::F>, radius: C::F) ->
     let small = C::F::c(SMALL);
     let size = problem.size;
     let mut lambda = cx.var(zero);
-    let mut cells = [cx.var(zero); 5];
+    // variables of their own: a copy would be the same one where code is recorded
+    let mut cells = [
+        cx.var(zero),
+        cx.var(zero),
+        cx.var(zero),
+        cx.var(zero),
+        cx.var(zero),
+    ];
     times!(cx, ITERATIONS, {
         let factor = Factor::new(problem, cx.get(&lambda));
         // y = -(P + λ)⁻¹ q, and how far outside it is
