@@ -15,6 +15,8 @@ use crate::step::{BlockOf, ConstantsOf};
 
 /// Rise of the cost past which a contact keeps its forces, as in MuJoCo [N·m/s²].
 pub(super) const RISE_MAX: f64 = 1e-10;
+/// What MuJoCo adds to the diagonal of A, so that a direction that moves nothing may stay solvable [1/kg].
+const DIAGONAL_MORE: f64 = 1e-10;
 /// Least normal force of a contact with friction (MuJoCo: `mjMINVAL`) [N].
 const NORMAL_MIN: f64 = 1e-15;
 
@@ -65,9 +67,13 @@ pub(super) fn solve<C: Cx>(
         for j in 0..n {
             scaled.matrix[i][j] = mu * mu * problem.matrix[i][j];
         }
+        // more on the diagonal, scaled as the row
+        let ratio = ratio(cx, t, r, i);
+        let more = ratio * ratio * C::F::c(DIAGONAL_MORE);
+        let diagonal = mu * mu * (problem.matrix[i][i] + more);
         // a direction that the contact does not have stays 0
         let has = zero.lt(problem.exists[i]);
-        scaled.matrix[i][i] = C::F::select(has, scaled.matrix[i][i], one);
+        scaled.matrix[i][i] = C::F::select(has, diagonal, one);
     }
     // the least y in the ball; f = μ y
     let after = ball::least(cx, &scaled, normal);
@@ -112,4 +118,16 @@ pub(super) fn squares<C: Cx>(cx: &mut C, t: &ContactsOf<C>, class: &ClassOf<C>, 
         sum = force.fma(force, sum);
     }
     normal.fma(normal, sum * ratio)
+}
+
+/// Friction of a direction over that of sliding, as the model has it.
+#[inline(always)]
+fn ratio<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, direction: usize) -> C::F {
+    let column = match direction {
+        0 | 1 => return C::F::c(1.0),
+        2 => 0,
+        _ => 1,
+    };
+    let pair = cx.load(t.memory.rows, r, row::PAIR);
+    cx.pick(t.turning, pair, column)
 }
