@@ -304,6 +304,20 @@ def test_a_model_that_does_not_run_stops_no_other(field: str, value: float, mess
         np.testing.assert_allclose(time, [0.004 if sim == 2 else 0.008 for sim in range(N)])
 
 
+def test_an_adhesion_with_velocity_stops_no_other() -> None:
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+      <body name="pad" pos="0 0 .1"><joint type="slide" axis="0 0 1"/><geom size=".1"/></body></worldbody>
+      <actuator><general body="pad" biastype="affine" biasprm="1 0 0"/></actuator></mujoco>""")
+    with Batch(model, N, 1, precision="f64") as batch:
+        bias = batch.expand("actuator_biasprm")
+        # a constant is a parameter, a factor of velocity is not supported
+        bias[1, 0, 0] = 3.0
+        batch.step()
+        bias[2, 0, 2] = -0.5
+        with pytest.raises(RuntimeError, match=r"sim 2: .*adhesion by a force that depends on velocity"):
+            batch.step()
+
+
 def test_more_models_than_there_may_be_are_refused_at_once() -> None:
     sims = MODELS_MAX + 4
     with Batch(model_of(), sims, 1, precision="f64") as batch:

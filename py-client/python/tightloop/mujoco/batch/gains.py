@@ -41,7 +41,7 @@ def factors(model: Any, name: str, values: Array) -> Array:
 
 
 def inexpressible(model: Any, name: str, values: Array) -> Array:
-    """Return which numbers no parameter expresses, ``(n, nu, 10)``: changed ones of muscles, velocities of adhesions.
+    """Return which changed numbers no parameter expresses, ``(n, nu, 10)``: of muscles, and with velocity of adhesions.
 
     Args:
         model: The model.
@@ -50,8 +50,6 @@ def inexpressible(model: Any, name: str, values: Array) -> Array:
     """
     kind, _, affine = _LAWS[name]
     kinds = np.asarray(getattr(model, kind))
-    changed = values != np.asarray(getattr(model, name)).astype(values.dtype)
-    wrong = changed & (kinds == _MUSCLES[name])[:, None]
-    adhesions = (np.asarray(model.actuator_trntype) == mujoco.mjtTrn.mjTRN_BODY) & (kinds == affine)
-    wrong[..., 2] |= adhesions & (values[..., 2] != 0)
-    return wrong
+    fixed = np.repeat((kinds == _MUSCLES[name])[:, None], values.shape[-1], axis=1)
+    fixed[:, 2] |= (np.asarray(model.actuator_trntype) == mujoco.mjtTrn.mjTRN_BODY) & (kinds == affine)
+    return (values != np.asarray(getattr(model, name)).astype(values.dtype)) & fixed

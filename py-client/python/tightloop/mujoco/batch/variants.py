@@ -235,7 +235,9 @@ class Variants:
                     whole.setdefault(key, []).extend(members)
                 else:
                     fields = {name: (name, kind, data) for name, kind, data in (*key, *extra)}
-                    todo.append((tuple(fields[name] for name in sorted(fields)), members))
+                    larger = tuple(fields[name] for name in sorted(fields))
+                    assert larger != key, f"{sorted(fields)}: a model with these values does not have them"
+                    todo.append((larger, members))
         return {key: sorted(sims) for key, sims in whole.items()}
 
     def _check_count(self, groups: dict[Key, list[int]]) -> None:
