@@ -36,10 +36,49 @@ const MASS_MIN: f64 = 1e-15;
 /// (3); added moments (3).
 const FLUID_COLUMNS: usize = 12;
 
-/// Does the medium act on anything?
-fn has_medium(file: &ModelFile) -> Result<bool, ModelError> {
-    let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
-    Ok(!is_off(file)? && (density > 0.0 || viscosity > 0.0))
+/// What bodies move in.
+struct Medium {
+    /// [kg/m³]
+    density: f64,
+    /// [Pa·s]
+    viscosity: f64,
+    /// Its velocity [m/s].
+    wind: [f64; 3],
+    /// Of each body, whether it acts on its geoms as ellipsoids.
+    are_ellipsoids: Vec<bool>,
+    /// Masses of the bodies [kg].
+    masses: Vec<f64>,
+}
+
+impl Medium {
+    /// That of a model; none where it acts on nothing.
+    fn read(file: &ModelFile, bodies: usize) -> Result<Option<Medium>, ModelError> {
+        let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
+        if is_off(file)? || (density <= 0.0 && viscosity <= 0.0) {
+            return Ok(None);
+        }
+        Ok(Some(Medium {
+            density,
+            viscosity,
+            wind: file.vectors::<3>("opt.wind", 1)?[0],
+            are_ellipsoids: are_ellipsoids(file, bodies)?,
+            masses: file.reals("body_mass", bodies)?,
+        }))
+    }
+}
+
+/// What the medium does to links as boxes, and to geoms as ellipsoids.
+pub(super) fn in_medium(
+    file: &ModelFile,
+    bodies: usize,
+) -> Result<(Vec<Drag>, Vec<EllipsoidInFluid>), ModelError> {
+    match Medium::read(file, bodies)? {
+        Some(medium) => Ok((
+            drags(file, &medium, bodies)?,
+            ellipsoids(file, &medium, bodies)?,
+        )),
+        None => Ok((Vec::new(), Vec::new())),
+    }
 }
 
 /// Of each body, does the medium act on its geoms as ellipsoids? Where one does, MuJoCo leaves out the body's box.
@@ -57,13 +96,11 @@ fn are_ellipsoids(file: &ModelFile, bodies: usize) -> Result<Vec<bool>, ModelErr
 }
 
 /// What the medium does to geoms that count as ellipsoids.
-pub(super) fn ellipsoids(
+fn ellipsoids(
     file: &ModelFile,
+    medium: &Medium,
     bodies: usize,
 ) -> Result<Vec<EllipsoidInFluid>, ModelError> {
-    if !has_medium(file)? {
-        return Ok(Vec::new());
-    }
     let geoms = file.rows("geom_type");
     let kinds = file.kinds("geom_type", geoms)?;
     let links = file.indices("geom_bodyid", geoms, bodies)?;
@@ -71,14 +108,10 @@ pub(super) fn ellipsoids(
     let turns = file.vectors::<4>("geom_quat", geoms)?;
     let sizes = file.vectors::<3>("geom_size", geoms)?;
     let rows = file.vectors::<FLUID_COLUMNS>("geom_fluid", geoms)?;
-    let masses = file.reals("body_mass", bodies)?;
-    let are_ellipsoids = are_ellipsoids(file, bodies)?;
-    let wind = file.vectors::<3>("opt.wind", 1)?[0];
-    let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
     let mut ellipsoids = Vec::new();
     for geom in 0..geoms {
         let row = rows[geom];
-        let acts = |&body: &usize| are_ellipsoids[body] && masses[body] >= MASS_MIN;
+        let acts = |&body: &usize| medium.are_ellipsoids[body] && medium.masses[body] >= MASS_MIN;
         let Some(link) = links[geom].filter(acts).filter(|_| row[0] != 0.0) else {
             continue;
         };
@@ -94,9 +127,9 @@ pub(super) fn ellipsoids(
             magnus_lift: row[5],
             added_mass: [row[6], row[7], row[8]],
             added_moments: [row[9], row[10], row[11]],
-            density,
-            viscosity,
-            wind,
+            density: medium.density,
+            viscosity: medium.viscosity,
+            wind: medium.wind,
         });
     }
     Ok(ellipsoids)
@@ -113,19 +146,14 @@ fn semi_axes(kind: &str, [a, b, c]: [f64; 3]) -> [f64; 3] {
 }
 
 /// What the medium does to links that have no geoms that count as ellipsoids: each is the box that has its mass and inertia.
-pub(super) fn drags(file: &ModelFile, bodies: usize) -> Result<Vec<Drag>, ModelError> {
-    if !has_medium(file)? {
-        return Ok(Vec::new());
-    }
-    let (density, viscosity) = (file.real("opt.density")?, file.real("opt.viscosity")?);
-    let (density, viscosity) = (density.max(0.0), viscosity.max(0.0));
-    let are_ellipsoids = are_ellipsoids(file, bodies)?;
-    let wind = file.vectors::<3>("opt.wind", 1)?[0];
-    let masses = file.reals("body_mass", bodies)?;
+fn drags(file: &ModelFile, medium: &Medium, bodies: usize) -> Result<Vec<Drag>, ModelError> {
+    let (density, viscosity) = (medium.density.max(0.0), medium.viscosity.max(0.0));
+    let masses = &medium.masses;
     let centers = file.vectors::<3>("body_ipos", bodies)?;
     let turns = file.vectors::<4>("body_iquat", bodies)?;
     let moments = file.vectors::<3>("body_inertia", bodies)?;
-    let boxes = (0..bodies).filter(|&body| masses[body] >= MASS_MIN && !are_ellipsoids[body]);
+    let boxes =
+        (0..bodies).filter(|&body| masses[body] >= MASS_MIN && !medium.are_ellipsoids[body]);
     let drags = boxes.map(|body| {
         let whole: f64 = moments[body].iter().sum();
         // I = m (b² + c²) / 12 of each axis
@@ -143,7 +171,7 @@ pub(super) fn drags(file: &ModelFile, bodies: usize) -> Result<Vec<Drag>, ModelE
             inertial: frame(centers[body], turns[body]),
             viscous: [3.0 * PI * mean * viscosity, PI * mean.powi(3) * viscosity],
             quadratic: [std::array::from_fn(linear), std::array::from_fn(angular)],
-            wind,
+            wind: medium.wind,
         }
     });
     Ok(drags.collect())

@@ -98,6 +98,7 @@ fn parts(
     if !mocaps.clone().is_sorted() {
         return Err(file.fault("has mocap bodies in another order than its bodies".to_owned()));
     }
+    let (drags, ellipsoids_in_fluid) = passive::in_medium(file, bodies)?;
     Ok(Precompiled {
         keyframes: super::keyframes::keyframes(file)?,
         mocaps: mocaps.collect(),
@@ -107,8 +108,8 @@ fn parts(
         joints: Vec::new(),
         equalities: super::constraints::equalities(file)?,
         constraints: Vec::new(),
-        drags: passive::drags(file, bodies)?,
-        ellipsoids_in_fluid: passive::ellipsoids(file, bodies)?,
+        drags,
+        ellipsoids_in_fluid,
         compensations: passive::compensations(file, bodies)?,
         spatial_tendons: Vec::new(),
         tendons: Vec::new(),
