@@ -56,9 +56,8 @@ def model(
     return XML.format(**parts)
 
 
-def compare_steps(case: Live, tolerance: float, forces: float | None = None) -> None:
+def compare_steps(case: Live, tolerance: float) -> None:
     """Step both sides, and compare forces, moments and states on the way."""
-    forces = forces or tolerance
     data = mujoco.MjData(case.model)
     data.ctrl[:] = CONTROLS
     frame = case.sim.write(ctrl=CONTROLS)
@@ -70,7 +69,7 @@ def compare_steps(case: Live, tolerance: float, forces: float | None = None) -> 
             for name in ("actuator_force", "actuator_length", "actuator_velocity", "qfrc_actuator", "qacc"):
                 found, expected = getattr(frame, name)[0], getattr(data, name)
                 scale = max(1.0, float(np.abs(expected).max()))
-                assert np.abs(found - expected).max() < forces * scale, f"{name} at {step}"
+                assert np.abs(found - expected).max() < tolerance * scale, f"{name} at {step}"
             touched |= set(case.model.geom_bodyid[data.contact.geom].ravel().tolist())
             assert frame.contact_count[0] == data.ncon
         frame = case.sim.step(ctrl=CONTROLS)
