@@ -80,7 +80,7 @@ impl Stage for Integrate {
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        m.integrator != Integrator::RungeKutta
+        matches!(m.integrator, Integrator::ImplicitFast | Integrator::Euler)
     }
 
     #[inline(always)]
@@ -93,28 +93,34 @@ impl Stage for Integrate {
                 b.work.acceleration[j] = cx.get(&b.joint_qdd[j]);
             }
         }
-        // the next solve starts from MuJoCo's accelerations: `acceleration` has what this step needs
-        if m.prescribed_search().is_some() {
-            keep_accelerations(cx, m, b);
+        advance(cx, m, b);
+    }
+}
+
+/// The next state by the accelerations of this step, which are in `acceleration`.
+#[inline(always)]
+pub(super) fn advance<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    // the next solve starts from MuJoCo's accelerations: `acceleration` has what this step needs
+    if m.prescribed_search().is_some() {
+        keep_accelerations(cx, m, b);
+    }
+    // free bodies that carry nothing and were not solved apart: implicit in their gyroscopic force here
+    for &body in &m.gyroscopic_bodies {
+        gyroscopic(cx, m, b, body);
+    }
+    // q̇ += h q̈', then q by the new q̇ (clients place mocap bodies)
+    for (k, body) in m.bodies.iter().enumerate() {
+        if body.motion == Motion::Free {
+            integrate_free(cx, m, b, k);
+        } else if body.motion != Motion::Mocap {
+            integrate_joint(cx, m, b, body);
         }
-        // free bodies that carry nothing and were not solved apart: implicit in their gyroscopic force here
-        for &body in &m.gyroscopic_bodies {
-            gyroscopic(cx, m, b, body);
-        }
-        // q̇ += h q̈', then q by the new q̇ (clients place mocap bodies)
-        for (k, body) in m.bodies.iter().enumerate() {
-            if body.motion == Motion::Free {
-                integrate_free(cx, m, b, k);
-            } else if body.motion != Motion::Mocap {
-                integrate_joint(cx, m, b, body);
-            }
-        }
-        // activations, as far as ȧ reaches in a step, clamped to their ranges
-        for activation in activations(m) {
-            let act = cx.get(&b.act[activation.place]);
-            let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
-            cx.set(&mut b.act[activation.place], act);
-        }
+    }
+    // activations, as far as ȧ reaches in a step, clamped to their ranges
+    for activation in activations(m) {
+        let act = cx.get(&b.act[activation.place]);
+        let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
+        cx.set(&mut b.act[activation.place], act);
     }
 }
 
@@ -124,9 +130,10 @@ pub(in crate::step) fn activations<R>(m: &Constants<R>) -> impl Iterator<Item = 
     actuators.filter_map(|actuator| actuator.activation.as_ref())
 }
 
-/// (M + h D) a = τ + Jᵀ f, with the damping D of joints and drives on the diagonal.
+/// Writes M + h D to the mass matrix, and τ + Jᵀ f to `acceleration`. D has the damping of joints and drives on its diagonal, and
+/// what is symmetric of that of other forces.
 #[inline(always)]
-fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+pub(super) fn damped_system<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
     // M q̈ equals the forces, without the rounding of stiff contact forces that cancel
     let mut rounded = None;
@@ -160,13 +167,19 @@ fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<
             w.acceleration[j] = C::F::select(touching, w.joint_force[j], w.acceleration[j]);
         }
     }
-    // `implicitfast` has the derivatives of actuators, tendons and the medium as well
-    if m.integrator == Integrator::ImplicitFast {
+    // all but Euler's step have the derivatives of actuators, tendons and the medium as well
+    if m.integrator != Integrator::Euler {
         damping::add_damping(cx, m, b);
         fluid::add_damping::<C>(m, b);
     }
     // damping of free joints, which is not diagonal in our velocities
     free_joints::add_damping(cx, m, b);
+}
+
+/// (M + h D) a = τ + Jᵀ f
+#[inline(always)]
+fn implicit_acceleration<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    damped_system(cx, m, b);
     // h N is not symmetric: these bodies are solved apart, while their block of the matrix is there
     for &body in &m.solved_bodies {
         let mut system = free_joints::system(cx, m, b, body);
