@@ -178,6 +178,7 @@ impl DaemonError {
                 | BackendError::DoubleOnGpu
                 | BackendError::LastSubstepOnGpu
                 | BackendError::NoSlipOnGpu
+                | BackendError::ImplicitOnGpu
                 | BackendError::LastSubstepSensors,
             ) => "ArgumentError",
             Backend(BackendError::Memory { .. } | BackendError::DeviceMemory { .. })

@@ -7,6 +7,7 @@ use crate::backend::{
 use crate::random::{Draws, Numbering};
 use sim_model::Model;
 use sim_physics::arrays::{Field, Layout};
+use sim_physics::constants::options::Integrator;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, UNIX_EPOCH};
@@ -185,10 +186,12 @@ pub(crate) fn backends(
     };
     let lags = options.outputs_at == OutputsAt::LastSubstep;
     let sweeps = model.constants().solver.noslip.is_some();
+    let implicit = model.constants().integrator == Integrator::Implicit;
     let note = match &options.device {
         Device::Gpu { .. } if lags => return Err(BackendError::LastSubstepOnGpu),
         Device::Gpu { .. } if precision == Precision::F64 => return Err(BackendError::DoubleOnGpu),
         Device::Gpu { .. } if sweeps => return Err(BackendError::NoSlipOnGpu),
+        Device::Gpu { .. } if implicit => return Err(BackendError::ImplicitOnGpu),
         Device::Gpu { adapter, cache } => return Ok((on_gpu(adapter, cache)?, None)),
         Device::Cpu => None,
         Device::Auto { .. } if lags => {
@@ -199,6 +202,9 @@ pub(crate) fn backends(
         }
         Device::Auto { .. } if sweeps => {
             Some("the processor: a GPU has no noslip_iterations".to_owned())
+        }
+        Device::Auto { .. } if implicit => {
+            Some("the processor: a GPU has no integrator `implicit`".to_owned())
         }
         Device::Auto { .. } if groups.all() < AUTO_WORLDS => {
             Some(format!("the processor: fewer than {AUTO_WORLDS} worlds"))

@@ -171,6 +171,14 @@ MODELS = {
     "cart-rk4": Model(CART.read_text().replace("implicitfast", "RK4"), 1e-8, 200),
     "machine": Model(MACHINE.format(integrator="Euler", range=NARROW), 1e-8, 100),
     "machine-implicitfast": Model(MACHINE.format(integrator="implicitfast", range=WIDE), 1e-8, 100),
+    "machine-implicit": Model(MACHINE.format(integrator="implicit", range=WIDE), 1e-8, 100),
+    "machine-implicit-saturated": Model(
+        MACHINE.format(integrator="implicit", range=NARROW),
+        1e-8,
+        100,
+        before=(4, 0),
+        note="implicit damps by actuators beyond `actuatorfrcrange`, as in MuJoCo 3.17",
+    ),
     "machine-saturated": Model(
         MACHINE.format(integrator="implicitfast", range=NARROW),
         1e-8,

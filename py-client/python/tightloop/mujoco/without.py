@@ -19,6 +19,7 @@ NOTES = "notes.without"
 _FLAGS = ("mjENBL_ENERGY", "mjENBL_FWDINV")
 #: Largest power of ``solimp``, as `sim-core/model/src/softness.rs` has it, and its place.
 _POWER_MAX, _POWER = 16.0, 4
+#: Integrators that every device has. A GPU has no ``mjINT_IMPLICIT``, so that a model may be made without it.
 _INTEGRATORS = ("mjINT_EULER", "mjINT_IMPLICITFAST", "mjINT_RK4")
 #: Arrays with a row for each element of a kind begin so.
 _PREFIXES = {"equality": "eq_", "pair": "pair_", "tendon": "tendon_", "actuator": "actuator_", "geom": "geom_"}

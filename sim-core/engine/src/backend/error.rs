@@ -272,6 +272,11 @@ pub enum BackendError {
         "a GPU has no `noslip_iterations`; launch with device=\"cpu\", or read the model without them: without=(\"noslip_iterations\",)"
     )]
     NoSlipOnGpu,
+    /// The integrator `implicit` on a GPU.
+    #[error(
+        "a GPU has no integrator `implicit`; launch with device=\"cpu\", or read the model with implicitfast: without=(\"integrator\",)"
+    )]
+    ImplicitOnGpu,
     /// Sensors at the last of the four points of a Runge-Kutta substep, where MuJoCo has none.
     #[error(
         "field `sensordata` of a Runge-Kutta step is evaluated at the state in the frame; use outputs_at = frame, or leave the field out"

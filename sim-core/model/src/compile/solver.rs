@@ -147,6 +147,8 @@ pub(super) fn is_damped(m: &Constants<f64>, implicit_damping: bool) -> bool {
     match m.integrator {
         Integrator::Euler => m.damped && implicit_damping,
         Integrator::RungeKutta => false,
+        // forces of bodies on each other change with the velocity, whatever else does
+        Integrator::Implicit => true,
         Integrator::ImplicitFast => {
             let tendons = &m.springs.tendons;
             m.damped

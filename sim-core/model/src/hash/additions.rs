@@ -326,7 +326,8 @@ view! {
 
 words! {
     Inner: Never "Never", Always "Always", Sometimes "Sometimes";
-    Integrator: ImplicitFast "ImplicitFast", Euler "Euler", RungeKutta "RungeKutta";
+    Integrator: ImplicitFast "ImplicitFast", Euler "Euler", RungeKutta "RungeKutta",
+        Implicit "Implicit";
 }
 
 /// How the solver ends in `f64`: no part of the text, since recordings in `f32` do not depend on it.

@@ -127,6 +127,10 @@ fn newer_steps(file: &ModelFile) -> Result<Vec<String>, ModelError> {
             integrator == Integrator::ImplicitFast && saturates && acts,
             "implicitfast damps by actuators beyond `actuatorfrcrange`, as in MuJoCo 3.17",
         ),
+        (
+            integrator == Integrator::Implicit && saturates && acts,
+            "implicit damps by actuators beyond `actuatorfrcrange`, as in MuJoCo 3.17",
+        ),
     ];
     let changed = changes.iter().filter(|(is_changed, _)| *is_changed);
     Ok(changed.map(|(_, note)| (*note).to_owned()).collect())

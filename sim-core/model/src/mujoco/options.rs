@@ -42,6 +42,7 @@ pub(super) fn integrator(file: &ModelFile) -> Result<Integrator, ModelError> {
     Ok(
         match file.texts("opt.integrator")?.first().map(String::as_str) {
             Some("mjINT_IMPLICITFAST") => Integrator::ImplicitFast,
+            Some("mjINT_IMPLICIT") => Integrator::Implicit,
             Some("mjINT_RK4") => Integrator::RungeKutta,
             _ => Integrator::Euler,
         },

@@ -102,9 +102,9 @@ fn options(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
     }
     let integrator = file.texts("opt.integrator")?;
     match integrator.first().map(String::as_str) {
-        Some("mjINT_EULER" | "mjINT_IMPLICITFAST" | "mjINT_RK4") => {}
+        Some("mjINT_EULER" | "mjINT_IMPLICIT" | "mjINT_IMPLICITFAST" | "mjINT_RK4") => {}
         other => refused.push(format!(
-            "option `integrator`: no support for {}, use Euler, implicitfast or RK4",
+            "option `integrator`: no support for {}, use Euler, implicit, implicitfast or RK4",
             other.unwrap_or("none")
         )),
     }

@@ -177,6 +177,11 @@ arrays! { m;
 
         rk_warm_start: RkWarmStart [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
+        // how bias forces change with velocities, see `step::tree::bias_slope`: of dofs, then of subtrees
+        carried_motion: CarriedMotion [Spatial; if m.integrator == Integrator::Implicit { m.dofs.len() } else { 0 }] Scratch "m/s, rad/s";
+        subtree_momentum: SubtreeMomentum [Vec3; if m.integrator == Integrator::Implicit { m.bodies.len() } else { 0 }] Scratch "kg·m/s";
+        subtree_whirl: SubtreeWhirl [Mat3; if m.integrator == Integrator::Implicit { m.bodies.len() } else { 0 }] Scratch "kg·m²/s";
+
         // the same of activations: where they began, and sums of their rates
         rk_act: RkAct [Scalar; if m.integrator == Integrator::RungeKutta { m.actuators.activations } else { 0 }] Stage "–";
         rk_act_rate_sum: RkActRateSum [Scalar; if m.integrator == Integrator::RungeKutta { m.actuators.activations } else { 0 }] Stage "1/s";

@@ -11,6 +11,8 @@ pub enum Integrator {
     ImplicitFast,
     /// Implicit in the damping of joints and drives alone.
     Euler,
+    /// Implicit in all forces that change with the velocity, those of rotating bodies on each other included.
+    Implicit,
     /// Runge-Kutta of fourth order.
     RungeKutta,
 }

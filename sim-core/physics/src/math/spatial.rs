@@ -43,6 +43,17 @@ impl<F: Num> Spatial<F> {
         ])
     }
 
+    /// Rate of a motion that is fixed to a body which has this velocity: `(ω × u + v × e, ω × e)`.
+    #[inline(always)]
+    pub fn carry(self, motion: Self) -> Self {
+        let (v, w) = (self[LINEAR], self[ANGULAR]);
+        let turned = w.cross(motion[LINEAR]);
+        Spatial([
+            v.cross_add(motion[ANGULAR], turned),
+            w.cross(motion[ANGULAR]),
+        ])
+    }
+
     /// Power of a force on a motion.
     #[inline(always)]
     pub fn dot(&self, force: Self) -> F {

@@ -84,6 +84,7 @@ macro_rules! every_stage {
             refine               [solver::Refine]                            Both;
             noslip               [solver::NoSlip]                            Both;
             integrate            [integrate::semi_implicit::Integrate]       Step;
+            implicit             [integrate::implicit::Implicit]             Step;
             // in its place, as `schedule::step_stages` orders them
             runge_kutta_0        [integrate::runge_kutta::Begin]             RungeKutta;
             runge_kutta_1        [integrate::runge_kutta::RungeKutta::<0>]   RungeKutta;

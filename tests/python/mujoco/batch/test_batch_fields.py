@@ -121,7 +121,7 @@ FIELDS = (
 
 
 @pytest.mark.parametrize("field", FIELDS)
-@pytest.mark.parametrize("integrator", ["implicitfast", "Euler", "RK4"])
+@pytest.mark.parametrize("integrator", ["implicit", "implicitfast", "Euler", "RK4"])
 def test_a_field_acts_as_in_a_model_of_its_own(field: str, integrator: str) -> None:
     model = model_of("elliptic" if integrator == "Euler" else "pyramidal", integrator)
     models = separate(model)

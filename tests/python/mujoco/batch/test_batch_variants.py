@@ -16,10 +16,12 @@ from tightloop.mujoco.batch import engine
 from tightloop.mujoco.batch.variants import MODELS_MAX
 
 RK4, EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
+IMPLICIT = int(mujoco.mjtIntegrator.mjINT_IMPLICIT)
 #: Field, place in it, and its values in some of the simulations.
 CASES: dict[str, tuple[str, Any, tuple[Any, ...]]] = {
     "timestep": ("timestep", (), (0.001, 0.002, 0.003)),
     "integrator": ("integrator", (), (RK4, EULER)),
+    "implicit": ("integrator", (), (IMPLICIT,)),
     "flags": ("disableflags", (), (int(mujoco.mjtDisableBit.mjDSBL_GRAVITY),)),
     "cone": ("cone", (), (int(mujoco.mjtCone.mjCONE_ELLIPTIC),)),
     "geom_size": ("geom_size", (4, 0), (0.12, 0.08, 0.12)),
@@ -284,7 +286,7 @@ def test_masses_in_a_medium_differ() -> None:
         ("timestep", -1.0, "dt is -1"),
         ("timestep", np.nan, "timestep"),
         ("integrator", 99, "99"),
-        ("integrator", int(mujoco.mjtIntegrator.mjINT_IMPLICIT), "mjINT_IMPLICIT"),
+        ("integrator", int(mujoco.mjtIntegrator.mjINT_DISCRETE), "mjINT_DISCRETE"),
         ("geom_type", 99, "geom_type is 99"),
         ("geom_pos", np.nan, "geom_pos"),
     ],

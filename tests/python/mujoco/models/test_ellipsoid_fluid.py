@@ -10,7 +10,7 @@ from live_model import live, relative
 import tightloop as tl
 
 WORLDS = 16
-INTEGRATORS = ("Euler", "implicitfast", "RK4")
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
 #: A chain, a ball, a free body that carries another, and one that carries none; `box` and `plate` count as boxes.
 XML = """<mujoco><option integrator="{integrator}" timestep=".002" density="{density}" viscosity="{viscosity}"
   wind="{wind}"/>

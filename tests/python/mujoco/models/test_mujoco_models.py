@@ -63,6 +63,7 @@ FEATURES = {
     "no gravity": replace(JOINTS, flag='gravity="disable"'),
     "unsafe references": replace(JOINTS, limits=True, flag='refsafe="disable"', option='timestep="0.004"'),
     "everything": EVERYTHING,
+    "everything in the matrix": replace(EVERYTHING, option=f'{MEDIUM} integrator="implicit"'),
     "everything implicit": replace(EVERYTHING, option=f'{MEDIUM} integrator="implicitfast"'),
 }
 
@@ -92,7 +93,7 @@ def test_accelerations_and_steps_are_mujocos(feature: str, seed: int) -> None:
         assert_step(case, seed, 1e-8)
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 @pytest.mark.parametrize("seed", sweep(range(TREES), daily=2))
 def test_runs_are_mujocos(integrator: str, seed: int) -> None:
     """200 steps under random controls, until MuJoCo disagrees with a run of its own that begins 1e-13 away."""
@@ -122,7 +123,7 @@ def test_runs_are_mujocos(integrator: str, seed: int) -> None:
         assert steps > 100
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
 @pytest.mark.parametrize("seed", range(TREES))
 def test_free_joints_and_balls_are_passive_as_mujocos(integrator: str, seed: int) -> None:
     """Springs that rest away from the start, axes that differ in armature and damping, and the energy of springs."""

@@ -181,7 +181,10 @@ def test_commands_are_checked(model):
             '<contact><pair name="p" geom1="f" geom2="g" friction="1 .5 .1 .1 .1"/></contact>',
             ["pair `p`: no support for sliding friction that differs between the two tangents"],
         ),
-        ('<option integrator="implicit"/><worldbody><body><joint/><geom size=".1"/></body></worldbody>', ["implicit"]),
+        (
+            '<option integrator="discrete"/><worldbody><body><joint/><geom size=".1"/></body></worldbody>',
+            ["option `integrator`: no support for mjINT_DISCRETE, use Euler, implicit"],
+        ),
     ],
 )
 def test_what_is_not_supported_is_refused_by_name(elements, reasons):

@@ -8,7 +8,7 @@ import pytest
 from live_model import live, relative
 
 WORLDS = 16
-INTEGRATORS = ("Euler", "implicitfast", "RK4")
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4")
 XML = """<mujoco><compiler angle="radian"/><option integrator="{integrator}" timestep=".001">
   <flag energy="enable" {flags}/></option>
 <default><geom contype="0" conaffinity="0" density="5000"/><joint armature=".02"/></default>

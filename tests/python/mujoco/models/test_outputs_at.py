@@ -26,7 +26,7 @@ def xml(seed: int, integrator: str) -> str:
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 @pytest.mark.parametrize("seed", range(4))
 def test_fields_after_a_step_are_mujocos(seed: int, integrator: str, substeps: int) -> None:
     with live(xml(seed, integrator), fields=LAGGING, substeps=substeps, outputs_at="last_substep") as case:

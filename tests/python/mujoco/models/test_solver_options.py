@@ -38,6 +38,7 @@ CASES = {
     "Runge-Kutta": 'integrator="RK4" iterations="2"',
     "Runge-Kutta to a loose tolerance": 'integrator="RK4" tolerance="1e-4"',
     "implicitfast": 'integrator="implicitfast" iterations="2" ls_iterations="6"',
+    "implicit": 'integrator="implicit" iterations="2" ls_iterations="6"',
     "defaults": "",
 }
 FLAGS = {"islands": "", "one island": 'island="disable"', "cold start": 'warmstart="disable"'}

@@ -38,7 +38,7 @@ XML = """<mujoco><option integrator="{integrator}" timestep=".002"/>
 </mujoco>"""
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 @pytest.mark.parametrize(("armature", "damping"), [(0.0, 0.2), (0.4, 0.2), (0.4, 0.0)])
 def test_accelerations_and_steps_are_mujocos(integrator, armature, damping):
     xml = XML.format(integrator=integrator, armature=armature, damping=damping)

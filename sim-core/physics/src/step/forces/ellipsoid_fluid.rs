@@ -20,7 +20,8 @@
 //! M += h Σ Jᵀ B J      and h Jᵀ B J c less on the right, c as in [`crate::step::tree::free_joints`]
 //! ```
 //!
-//! As in MuJoCo, B is made symmetric, except for a free body that carries nothing: that one is solved apart.
+//! As in MuJoCo, B is made symmetric, except for a free body that carries nothing: that one is solved apart. A step with
+//! `implicit` has B as it is.
 
 use super::link_forces;
 use crate::arrays::Workspace;
@@ -227,19 +228,33 @@ impl<F: Num> Resistance<F> {
     /// (B + Bᵀ) / 2
     #[inline(always)]
     fn symmetric(self) -> Resistance<F> {
-        let (b, half) = (self.0, F::c(0.5));
-        let mut even = b;
+        let (turned, half) = (self.transposed(), F::c(0.5));
+        let mut even = self;
+        for part in [LINEAR, ANGULAR] {
+            for other in [LINEAR, ANGULAR] {
+                for j in 0..3 {
+                    even.0[part][other][j] =
+                        (self.0[part][other][j] + turned.0[part][other][j]) * half;
+                }
+            }
+        }
+        even
+    }
+
+    /// Bᵀ
+    #[inline(always)]
+    fn transposed(self) -> Resistance<F> {
+        let mut turned = self;
         for part in [LINEAR, ANGULAR] {
             for other in [LINEAR, ANGULAR] {
                 for i in 0..3 {
                     for j in 0..3 {
-                        even[part][other][j][i] =
-                            (b[part][other][j][i] + b[other][part][i][j]) * half;
+                        turned.0[part][other][j][i] = self.0[other][part][i][j];
                     }
                 }
             }
         }
-        Resistance(even)
+        turned
     }
 }
 
@@ -285,35 +300,73 @@ fn swing<F: Num>(w: &Workspace<F>, free: usize) -> Spatial<F> {
     Spatial([spin.cross(spin.cross(origin)), Vec3::zero()])
 }
 
-/// Adds h Jᵀ B J to the mass matrix, and subtracts h Jᵀ B J c from the right-hand side, `acceleration`; B is symmetric. Geoms of
-/// bodies that are solved apart are left to [`add_to_system`].
+/// Adds h Jᵀ B J to the mass matrix, and subtracts h Jᵀ B J c from the right-hand side, `acceleration`; B is made symmetric.
+/// Geoms of bodies that are solved apart are left to [`add_to_system`].
 #[inline(always)]
-pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    let (w, dt) = (&mut b.work, C::F::k(m.dt));
+pub(super) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let w = &mut b.work;
     for geom in &m.fluid_geoms {
         if m.solved_bodies.contains(&geom.body) {
             continue;
         }
         let flow = Flow::around(w, geom);
         let resistance = flow.resistance(geom).symmetric();
-        // all dofs that move the geom
-        let body = &m.bodies[geom.body];
-        let last = body.dofs().end - 1;
-        for row in path(m, last) {
-            // h B J of a dof, then Jᵀ of those before it on the path: each pair once
-            let force = flow.against(&resistance, w.motion[row.other] * dt);
-            for entry in path(m, row.other) {
-                let place = &mut w.mass_matrix[entry.place];
-                *place = *place + w.motion[entry.other].dot(force);
-            }
+        let last = m.bodies[geom.body].dofs().end - 1;
+        add_product(m, (&flow, &resistance), &w.motion, &mut w.mass_matrix, last);
+        subtract_swing(m, (&flow, &resistance), w, geom.body);
+    }
+}
+
+/// The same with B as it is. The mass matrix has entries at and below the diagonal, `hessian` has those above it, transposed.
+#[inline(always)]
+pub(in crate::step) fn add_whole_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
+    let w = &mut b.work;
+    for geom in &m.fluid_geoms {
+        let flow = Flow::around(w, geom);
+        let resistance = flow.resistance(geom);
+        // S(j) · B S(i) of the later dof j is S(i) · Bᵀ S(j)
+        let turned = resistance.transposed();
+        let last = m.bodies[geom.body].dofs().end - 1;
+        add_product(m, (&flow, &turned), &w.motion, &mut w.mass_matrix, last);
+        add_product(m, (&flow, &resistance), &w.motion, &mut w.hessian, last);
+        subtract_swing(m, (&flow, &resistance), w, geom.body);
+    }
+}
+
+/// Adds h S(i) · B S(j) of the dofs j on the path of the last dof, and of the dofs i before each.
+#[inline(always)]
+fn add_product<F: Num>(
+    m: &Constants<F::Real>,
+    (flow, resistance): (&Flow<F>, &Resistance<F>),
+    motion: &[Spatial<F>],
+    matrix: &mut [F],
+    last: usize,
+) {
+    let dt = F::k(m.dt);
+    for row in path(m, last) {
+        // h B J of a dof, then Jᵀ of those before it on the path: each pair once
+        let force = flow.against(resistance, motion[row.other] * dt);
+        for entry in path(m, row.other) {
+            let place = &mut matrix[entry.place];
+            *place = *place + motion[entry.other].dot(force);
         }
-        // the right-hand side less h Jᵀ B J c
-        if let Some(free) = m.trees[body.tree].free {
-            let force = flow.against(&resistance, swing(w, free) * dt);
-            for row in path(m, last) {
-                let pulled = &mut w.acceleration[row.other];
-                *pulled = *pulled - w.motion[row.other].dot(force);
-            }
+    }
+}
+
+/// Subtracts h Jᵀ B J c of a geom of a body from the right-hand side.
+#[inline(always)]
+fn subtract_swing<F: Num>(
+    m: &Constants<F::Real>,
+    (flow, resistance): (&Flow<F>, &Resistance<F>),
+    w: &mut Workspace<F>,
+    body: usize,
+) {
+    let body = &m.bodies[body];
+    if let Some(free) = m.trees[body.tree].free {
+        let force = flow.against(resistance, swing(w, free) * F::k(m.dt));
+        for row in path(m, body.dofs().end - 1) {
+            let pulled = &mut w.acceleration[row.other];
+            *pulled = *pulled - w.motion[row.other].dot(force);
         }
     }
 }

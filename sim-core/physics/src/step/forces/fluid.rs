@@ -16,6 +16,7 @@
 use super::{ellipsoid_fluid, link_forces};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
+use crate::constants::options::Integrator;
 use crate::constants::passive::Drag;
 use crate::lane::{Cx, Num, Real};
 use crate::math::spatial::{ANGULAR, LINEAR};
@@ -115,7 +116,10 @@ impl<F: Num> Flow<F> {
 /// Adds h Jᵀ B J to the mass matrix, and subtracts h Jᵀ B J c from the right-hand side, `acceleration`.
 #[inline(always)]
 pub(in crate::step) fn add_damping<C: Cx>(m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
-    ellipsoid_fluid::add_damping::<C>(m, b);
+    // a step with `implicit` has these as they are, which is not symmetric
+    if m.integrator != Integrator::Implicit {
+        ellipsoid_fluid::add_damping::<C>(m, b);
+    }
     let (w, dt) = (&mut b.work, C::F::k(m.dt));
     for drag in &m.drags {
         let flow = Flow::around(w, drag);

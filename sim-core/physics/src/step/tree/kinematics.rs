@@ -232,7 +232,7 @@ pub(in crate::step) fn mocap_quat<F: Num>(all: &[F], k: usize) -> quat::Quat<F> 
 
 /// Inertia of a body about a point, from which its origin is given; where masses vary, the sum of those of its links.
 #[inline(always)]
-fn inertia<F: Num>(
+pub(super) fn inertia<F: Num>(
     m: &Constants<F::Real>,
     params: &[F],
     body: &Body<F::Real>,

@@ -2,6 +2,7 @@
 
 use sim_physics::arrays::Array;
 use sim_physics::constants::Constants;
+use sim_physics::constants::options::Integrator;
 use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
 use std::ops::Range;
@@ -32,7 +33,12 @@ pub(super) fn suits(m: &Constants<f64>) -> bool {
     };
     // the code of a sweep over rows of friction would have the factor of M once per row
     let sweeps = m.solver.noslip.is_some();
-    !sweeps && m.pattern.len() <= ENTRIES_MAX && parts(m) * evaluations.count() <= parts_max
+    // both triangles of the step's matrix would be written out
+    let implicit = m.integrator == Integrator::Implicit;
+    !sweeps
+        && !implicit
+        && m.pattern.len() <= ENTRIES_MAX
+        && parts(m) * evaluations.count() <= parts_max
 }
 
 /// What a bend of a tendon around a shape counts: its code is as long as that of so many joints [–].
