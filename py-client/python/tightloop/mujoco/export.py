@@ -103,10 +103,10 @@ _NAMED = {
     "sensor": "nsensor",
 }
 _REAL_OPTIONS = (
-    *("timestep", "gravity", "tolerance", "ls_tolerance", "noslip_tolerance", "impratio"),
+    *("timestep", "gravity", "tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
     *("density", "viscosity", "wind", "magnetic"),
 )
-_COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "disableactuator")
+_COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "disableactuator")
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor", "nsensordata")
 
 

@@ -8,6 +8,7 @@ use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
 use sim_physics::constants::actuators::{ActivationRate, Muscle};
+use sim_physics::constants::hull::reference::Limits;
 use sim_physics::constants::options::Integrator;
 
 /// What a robot that MuJoCo compiled has beyond links and joints. Link 0 is the world, and links are in MuJoCo's order.
@@ -60,6 +61,8 @@ pub struct Precompiled {
     /// Most sweeps over the rows of friction after the solver, and the gain of one that ends them, `noslip_iterations` and
     /// `noslip_tolerance` [–].
     pub noslip: (usize, f64),
+    /// When its search for contacts without a closed form ends in `f64`.
+    pub contact_search: Limits,
     /// Whether the solver handles trees that no constraint couples one by one in `f64`.
     pub islands: bool,
     /// Whether the solver may start from the last step's accelerations in `f64`.

@@ -6,8 +6,11 @@ use sim_physics::constants::contact::{
 };
 use sim_physics::constants::height_field::FieldTables;
 use sim_physics::constants::hull::HullTables;
+use sim_physics::constants::hull::reference::{Limits, ReferenceSearch};
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::lane::{Fixed, Table, Tables};
+
+use std::sync::Arc;
 
 use super::text::{Text, View, When, view, words};
 
@@ -33,6 +36,7 @@ view! {
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         Never { "ordered_corners": ordered_corners }
+        Later { "contact_search": reference }
         => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
     Handles as "Handles":
         Always {
@@ -126,6 +130,27 @@ words! {
     FrictionCombine: Max "Max", Mean "Mean", Min "Min", Product "Product";
     Kind: Plane "Plane", Field "Field", Sphere "Sphere", Capsule "Capsule", Box "Box", Cylinder "Cylinder",
         Ellipsoid "Ellipsoid", Hull "Hull";
+}
+
+/// By when it ends: hulls are in the tables.
+impl View for Arc<ReferenceSearch> {
+    fn write(&self, text: &mut Text) {
+        let Limits {
+            iterations,
+            tolerance,
+            several,
+        } = &self.limits;
+        let values: [(&str, &dyn View); 3] = [
+            ("iterations", iterations),
+            ("tolerance", tolerance),
+            ("several", several),
+        ];
+        text.groups("ContactSearch", &[(When::Always, &values)]);
+    }
+
+    fn is_absent(&self) -> bool {
+        self.limits == Limits::default()
+    }
 }
 
 impl View for Table {

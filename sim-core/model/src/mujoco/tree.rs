@@ -14,6 +14,7 @@ use crate::description::{
 use crate::error::ModelError;
 use crate::pose::Pose;
 use crate::softness::Softness;
+use sim_physics::constants::hull::reference::{ITERATIONS_MAX, Limits};
 
 /// Links and joints, without shapes and actuators.
 pub(super) fn robot(file: &ModelFile, options: &MujocoOptions) -> Result<Robot, ModelError> {
@@ -126,12 +127,27 @@ fn parts(
             usize::try_from(file.integer("opt.noslip_iterations")?).unwrap_or(0),
             file.real_or("opt.noslip_tolerance", NOSLIP_TOLERANCE)?,
         ),
+        contact_search: contact_search(file)?,
         islands: !has_flag(file, "mjDSBL_ISLAND")?,
         warm_start: !has_flag(file, "mjDSBL_WARMSTART")?,
         implicit_damping: !has_flag(file, "mjDSBL_EULERDAMP")?,
         safe_references: !has_flag(file, "mjDSBL_REFSAFE")?,
         frames: frames::frames(file, bodies)?,
         sensors: SensorParts::default(),
+    })
+}
+
+/// When the search for contacts ends; as MuJoCo's does by default for files that older versions wrote.
+fn contact_search(file: &ModelFile) -> Result<Limits, ModelError> {
+    let usual = Limits::default();
+    let iterations = match file.rows("opt.ccd_iterations") {
+        0 => usual.iterations,
+        _ => usize::try_from(file.integer("opt.ccd_iterations")?).unwrap_or(0),
+    };
+    Ok(Limits {
+        iterations: iterations.clamp(1, ITERATIONS_MAX),
+        tolerance: file.real_or("opt.ccd_tolerance", usual.tolerance)?,
+        several: !has_flag(file, "mjDSBL_MULTICCD")?,
     })
 }
 

@@ -4,11 +4,13 @@ use super::Impedance;
 use super::clip::Cut;
 use super::height_field::FieldTables;
 use super::hull::HullTables;
+use super::hull::reference::ReferenceSearch;
 use super::pair_groups::Group;
 pub use super::pair_groups::{Kind, PAIR_KINDS};
 use super::recast::{Recast, recast, same};
 use crate::lane::{Fixed, Num, Real, Table, Tables};
 use crate::math::factor::UpdatePath;
+use std::sync::Arc;
 
 /// Shape of the friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,6 +74,8 @@ recast! {
         pub two_point_capsule_boxes: bool,
         /// Whether the corners of a box on a plane or on a box are in MuJoCo's order, which matters where contacts are swept.
         pub ordered_corners: bool,
+        /// MuJoCo's search for contacts.
+        pub reference: Arc<ReferenceSearch>,
         /// Impedances of pairs.
         pub impedances: PairImpedances<R>,
         /// Bodies that contacts act on, among those of outputs.
@@ -587,6 +591,7 @@ impl<R: Real> Contacts<R> {
             named_pairs: Fixed::default(),
             two_point_capsule_boxes: false,
             ordered_corners: false,
+            reference: Arc::default(),
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),
         }

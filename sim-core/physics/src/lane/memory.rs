@@ -161,6 +161,10 @@ impl<F: Lane> Cx for Cpu<'_, F> {
         F::c(i as f64)
     }
     #[inline(always)]
+    fn reference(&mut self, x: F) -> f64 {
+        x.lane(0).to_f64()
+    }
+    #[inline(always)]
     fn constant(&mut self, t: Fixed, row: usize, k: usize) -> F {
         debug_assert!(
             row < t.rows && k < t.stride,

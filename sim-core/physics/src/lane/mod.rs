@@ -334,6 +334,12 @@ pub trait Cx: Sized {
     fn at(&self, i: usize) -> Self::I;
     /// An index as a scalar.
     fn number(&mut self, i: Self::I) -> Self::F;
+    /// The number of the one world of a block. Only code that double precision alone runs may ask: lanes have several, and a
+    /// recording has none.
+    #[inline(always)]
+    fn reference(&mut self, _x: Self::F) -> f64 {
+        unreachable!("a block of double precision has one world")
+    }
     /// Scalar `k` of a row of a table of the model.
     fn constant(&mut self, t: Fixed, row: Self::I, k: usize) -> Self::F;
     /// Neighbouring scalars of a row of a table of the model, from scalar `k` on.

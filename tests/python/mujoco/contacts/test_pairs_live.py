@@ -7,6 +7,7 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 import pytest
+from geom_pairs import PAIR_FIELDS, assert_pair_is_mujocos
 from numpy.random import Generator
 from numpy.typing import NDArray
 
@@ -14,12 +15,9 @@ import tightloop as tl
 
 Array = NDArray[np.float64]
 
-FIELDS = ("contact_count", "contact_pos", "contact_normal", "contact_distance", "qacc", "contacts_left_out")
 XML = """<mujoco><option gravity="0 0 0" tolerance="0" iterations="200" ls_iterations="100"/><worldbody>
 <geom type="{kind}" size="{a}" margin="{margin}"/>
 <body><freejoint/><geom type="{kind}" size="{b}" mass="1"/></body></worldbody></mujoco>"""
-#: Distances, places [m] and normals agree to this, accelerations to as much of the largest.
-SAME = 1e-9
 WORLDS = 1250
 #: Half extents of boxes, radius and half height of capsules [m]: of either shape.
 BOXES = (
@@ -98,32 +96,6 @@ def states(rng: Generator, model: mujoco.MjModel, kind: str, attitude: Callable,
     return qpos
 
 
-def assert_pair_is_mujocos(model: mujoco.MjModel, qpos: Array) -> Array:
-    """Compare every world; how many points they have."""
-    with tl.launch(tl.Scene.from_mujoco(model), worlds=len(qpos), precision="f64", fields=FIELDS) as sim:
-        frame = sim.write(joint_q=qpos[:, [0, 1, 2, 4, 5, 6, 3]])
-        assert not frame.contacts_left_out.any()
-        counts = np.array(frame.contact_count)
-        ours = np.concatenate([frame.contact_distance[..., None], frame.contact_pos, frame.contact_normal], axis=-1)
-        accelerations = np.array(frame.qacc)
-    data = mujoco.MjData(model)
-    for world, pose in enumerate(qpos):
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = pose
-        mujoco.mj_forward(model, data)
-        theirs = np.column_stack([data.contact.dist, data.contact.pos, data.contact.frame[:, :3]])
-        found = ours[world, : counts[world]]
-        assert len(found) == len(theirs), f"{pose.tolist()}: {found}, MuJoCo {theirs}"
-        for point in theirs:
-            # each of ours stands for one of MuJoCo's, which may have the same point twice
-            off = np.abs(found - point).max(1)
-            assert off.min() <= SAME, f"{pose.tolist()}: {found}, MuJoCo {theirs}"
-            found = np.delete(found, off.argmin(), axis=0)
-        scale = max(np.abs(data.qacc).max(), 1.0)
-        assert np.abs(accelerations[world] - data.qacc).max() <= 1e-8 * scale, f"{pose.tolist()}"
-    return counts
-
-
 def model_of(kind: str, sizes: tuple[str, str], margin: float) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(XML.format(kind=kind, a=sizes[0], b=sizes[1], margin=margin))
 
@@ -179,7 +151,7 @@ TILTED = {
 def test_a_box_tilted_on_a_box_keeps_the_points_of_its_face(case):
     pose, distances, normal, acceleration = TILTED[case]
     model = model_of("box", BOXES[0], 0.0)
-    with tl.launch(tl.Scene.from_mujoco(model), worlds=1, precision="f64", fields=FIELDS) as sim:
+    with tl.launch(tl.Scene.from_mujoco(model), worlds=1, precision="f64", fields=PAIR_FIELDS) as sim:
         frame = sim.write(joint_q=[np.array(pose)[[0, 1, 2, 4, 5, 6, 3]]])
         assert frame.contact_count[0] == len(distances)
         np.testing.assert_allclose(np.sort(frame.contact_distance[0, : len(distances)]), distances, atol=1e-6)

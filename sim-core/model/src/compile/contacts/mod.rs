@@ -5,6 +5,7 @@ mod fields;
 mod memory;
 mod pairs;
 pub(super) mod pieces;
+mod reference;
 pub(super) mod sensors;
 mod varying;
 
@@ -27,6 +28,7 @@ use sim_physics::math::factor::{Pattern, UpdatePath};
 use sim_physics::step::constraints::contact_rows::{EDGES_MAX, edge_stiffness};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Stiffness of a contact over the mass of what it moves, above which single precision may lose that mass in their sum [–]. Levers
 /// make the entries of a matrix ten times as stiff, so this is a tenth of what the solver allows there.
@@ -41,6 +43,7 @@ pub(super) fn add_contacts(
 ) -> Result<(), ModelError> {
     let mut contacts = Contacts::none(scene.solver.cone, scene.solver.impratio);
     let pieces = pieces(shapes, &mut contacts);
+    Arc::make_mut(&mut contacts.reference).limits = reference::limits(scene);
     let filtered = scene.filtered_pairs()?;
     let mut pairs = pairs(shapes, &pieces, rules, &filtered)?;
     // by kind, then in scene order

@@ -2,6 +2,7 @@
 
 use super::super::carrier::Carrier;
 use super::super::inverse_weight::Reference;
+use super::reference;
 use crate::description::{ContactPair, Description, Joint, Precompiled, Robot};
 use crate::error::ModelError;
 use crate::geom_contact::GeomContact;
@@ -16,6 +17,7 @@ use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Contacts, Kind, Solid};
 use sim_physics::constants::height_field::FIELD_CONTACTS;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A shape of the scene, with what carries it.
 pub(in crate::compile) struct PlacedShape<'a> {
@@ -299,6 +301,8 @@ pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -
     let with_fans = is_mujocos && touches(Kind::Plane, false);
     let (tables, frames) = hull_tables::append(&hulls, with_fans, &mut contacts.tables);
     contacts.hulls = tables;
+    let centers = frames.iter().map(|frame| frame.center);
+    contacts.reference = Arc::new(reference::search(shapes, &hulls, centers));
     for piece in pieces
         .iter_mut()
         .filter(|piece| piece.solid.kind == Kind::Hull)

@@ -18,6 +18,7 @@
 //! | sphere and ellipsoid | the point of the ellipsoid that is nearest to the centre | `primitive/ellipsoids` |
 //! | with an ellipsoid | GJK from the best of a few axes | `primitive/ellipsoids` |
 //! | with a cylinder or a hull | [`convex::pairs`]: axes, GJK, clipping | `primitive/cylinders`, `convex/hulls` |
+//! | the last four, in `f64` models from MuJoCo | MuJoCo's iterations | `reference` |
 //! | height field | a convex prism below each of its triangles | `height_field`, `convex/{prisms,prism_ellipsoid,prism_hull}` |
 
 mod convex;
@@ -25,6 +26,7 @@ mod height_field;
 mod manifold;
 mod narrow;
 mod primitive;
+mod reference;
 mod surfaces;
 mod variables;
 
@@ -243,12 +245,15 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
             };
             let shape_b = Shape::read(cx, t, kinds.1, p, pair::SIZE_B, pair::HULL_B);
             let smaller = cx.constant(scalars, p, pair::SMALLER);
+            let reach = cx.constant(scalars, p, pair::REACH);
             let shapes = ShapePair {
                 axes_a: &axes_a,
                 a: shape_a,
                 pose_b: &pose_b,
                 b: shape_b,
-                margin: cx.constant(scalars, p, pair::REACH) + contact_slack(smaller),
+                margin: reach + contact_slack(smaller),
+                reach,
+                reference: &t.reference,
                 hull_tables: &t.hulls,
                 clip_tables: t.memory.cut,
                 two_point_capsule_boxes: t.two_point_capsule_boxes,

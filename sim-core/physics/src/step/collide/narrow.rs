@@ -5,11 +5,13 @@ use super::convex::hull::Hull;
 use super::convex::{hulls, plane_hull};
 use super::manifold::points::Points;
 use super::primitive::{boxes, capsules, cylinders, ellipsoids, planes, spheres};
+use super::reference::{iterates, reference_contacts};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::clip::Cut;
 use crate::constants::contact::{Contacts, Kind};
 use crate::constants::hull::HullTables;
+use crate::constants::hull::reference::ReferenceSearch;
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
 use crate::step::{BlockOf, ConstantsOf, Stage};
@@ -57,6 +59,12 @@ impl<C: Cx> Shape<C> {
             size: Vec3([C::F::c(0.0); 3]),
             hull: any,
         }
+    }
+
+    /// Its row in the table of hulls, if it is one.
+    #[inline(always)]
+    pub(super) fn hull(&self) -> C::I {
+        self.hull
     }
 
     /// Radius of a sphere, capsule or cylinder [m].
@@ -125,8 +133,12 @@ pub struct ShapePair<'a, C: Cx> {
     pub pose_b: &'a ShapePose<C::F>,
     /// The second shape.
     pub b: Shape<C>,
-    /// Distance below which contacts are found [m].
+    /// Distance below which contacts are found, with a slack for rounding [m].
     pub margin: C::F,
+    /// The same without it [m].
+    pub reach: C::F,
+    /// MuJoCo's search.
+    pub reference: &'a ReferenceSearch,
     /// Tables of the model's hulls.
     pub hull_tables: &'a HullTables,
     /// Scratch tables for clipping.
@@ -187,6 +199,14 @@ macro_rules! pairs {
 
                 #[inline(always)]
                 fn contacts<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
+                    // in double precision, models from MuJoCo have its points
+                    let is_reference = <<C::F as Num>::Real as Real>::DOUBLE && pair.reference.is_used;
+                    if is_reference
+                        && iterates(Self::KINDS)
+                        && reference_contacts(cx, Self::KINDS, pair, out)
+                    {
+                        return;
+                    }
                     $contacts(cx, pair, out);
                 }
             }

@@ -145,7 +145,8 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
     ]);
     let shape = Shape::read(cx, t, N::KIND, p, pair::SIZE_B, pair::HULL_B);
     let size = cx.constant(scalars, p, pair::SMALLER);
-    let margin = cx.constant(scalars, p, pair::REACH) + contact_slack(size);
+    let distance = cx.constant(scalars, p, pair::REACH);
+    let margin = distance + contact_slack(size);
     // reaches along the normals of sides, which all prisms share: computed once for the pair
     let reach = FieldReach {
         half: N::half_extents(shape.half_extents(), &axes),
@@ -172,6 +173,8 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
             pose_b: &ground,
             b: Shape::none(a),
             margin,
+            reach: distance,
+            reference: &t.reference,
             hull_tables: &t.hulls,
             clip_tables: t.memory.cut,
             two_point_capsule_boxes: false,

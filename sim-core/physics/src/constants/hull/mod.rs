@@ -1,5 +1,7 @@
 //! Where the convex hulls of a model are in its tables.
 
+pub mod reference;
+
 use crate::lane::Fixed;
 
 /// Most corners of a face in a table: of a face with more, so many are kept, evenly around it.

@@ -1,0 +1,56 @@
+//! Hulls and limits of MuJoCo's search for contacts, which `f64` has where a model is from MuJoCo.
+
+use super::super::solver::precompiled_parts;
+use super::pieces::PlacedShape;
+use crate::description::Description;
+use crate::geometry::Hull;
+use sim_physics::constants::hull::reference::{Limits, ReferenceHull, ReferenceSearch};
+
+/// The search of a scene whose tables have these hulls with these centres.
+pub(super) fn search(
+    shapes: &[PlacedShape<'_>],
+    hulls: &[Hull],
+    centers: impl Iterator<Item = [f64; 3]>,
+) -> ReferenceSearch {
+    let is_used = shapes.iter().any(|shape| shape.geom.is_some());
+    let hulls = hulls.iter().zip(centers);
+    ReferenceSearch {
+        is_used,
+        hulls: match is_used {
+            true => hulls
+                .map(|(hull, center)| reference_hull(hull, center))
+                .collect(),
+            false => Vec::new(),
+        },
+        ..ReferenceSearch::default()
+    }
+}
+
+/// When it ends: of several models, the last to end counts.
+pub(super) fn limits(scene: &Description) -> Limits {
+    let limits = precompiled_parts(scene).map(|parts| parts.contact_search);
+    let both = |a: Limits, b: Limits| Limits {
+        iterations: a.iterations.max(b.iterations),
+        tolerance: a.tolerance.min(b.tolerance),
+        several: a.several && b.several,
+    };
+    limits.reduce(both).unwrap_or_default()
+}
+
+/// A hull by MuJoCo's polygons, or by its own faces where it has none.
+fn reference_hull(hull: &Hull, center: [f64; 3]) -> Option<ReferenceHull> {
+    let polygons = hull
+        .polygons
+        .iter()
+        .map(|side| (side.corners.clone(), side.normal));
+    let faces = hull
+        .faces
+        .iter()
+        .map(|side| (side.corners.clone(), side.normal));
+    let sides: Vec<_> = match hull.polygons.is_empty() {
+        true => faces.collect(),
+        false => polygons.collect(),
+    };
+    let origin = center.map(|x| -x);
+    ReferenceHull::new(origin, hull.vertices.clone(), sides.into_iter())
+}

@@ -1,0 +1,132 @@
+//! MuJoCo's own search for the contacts of two shapes without a closed form, in double precision.
+//!
+//! Iterations that end at a tolerance leave a normal and a depth that depend on the path to them. So runs agree with MuJoCo
+//! only where decisions are the same: those of its `engine_collision_gjk.c` and `engine_collision_convex.c`, as 3.17 has them.
+//! A block of `f64` has one world, so this code may branch on its numbers. Lanes and GPUs have [`super::convex`] instead.
+//!
+//! | Part | File |
+//! |---|---|
+//! | shapes, their support functions | `solid` |
+//! | the distance of shapes that do not overlap | `gjk`, `nearest` |
+//! | the depth of those that do | `epa`, `first_polytope`, `polytope` |
+//! | several points of shapes that lie on each other | `features`, `sides`, `clip` |
+//! | all of it, with margins | `search` |
+
+mod clip;
+mod epa;
+mod features;
+mod first_polytope;
+mod gjk;
+mod nearest;
+mod polytope;
+mod search;
+mod sides;
+mod solid;
+mod vector;
+
+use super::manifold::points::Points;
+use super::narrow::{Shape, ShapePair};
+use crate::constants::contact::Kind;
+use crate::constants::hull::reference::ReferenceSearch;
+use crate::lane::{Cx, Num, Real};
+use crate::math::vec3::{Mat3, Vec3};
+use clip::Contacts;
+use search::Nearest;
+use solid::{Form, Solid};
+
+/// Do two kinds of shapes touch where iterations end? The others have closed forms, or a height field.
+pub const fn iterates((first, second): (Kind, Kind)) -> bool {
+    match (first, second) {
+        (Kind::Plane | Kind::Field, _) | (Kind::Box, Kind::Box) => false,
+        (Kind::Sphere, second) => matches!(second, Kind::Ellipsoid | Kind::Hull),
+        (Kind::Capsule, second) => !matches!(second, Kind::Capsule | Kind::Box),
+        _ => true,
+    }
+}
+
+/// Adds the contacts of a pair, and returns whether the search has room for its shapes.
+#[inline(always)]
+pub fn reference_contacts<C: Cx>(
+    cx: &mut C,
+    (first, second): (Kind, Kind),
+    pair: &ShapePair<'_, C>,
+    out: &mut Points<C>,
+) -> bool {
+    // the first shape is at the origin
+    let search = pair.reference;
+    let center = Vec3([C::F::c(0.0); 3]);
+    let first_solid = solid(cx, search, first, &pair.a, pair.axes_a, center);
+    let b = pair.pose_b;
+    let second_solid = solid(cx, search, second, &pair.b, &b.axes, b.center);
+    let (Some(a), Some(b)) = (first_solid, second_solid) else {
+        return false;
+    };
+    let margin = cx.reference(pair.reach);
+    // MuJoCo's order of kinds has ellipsoids and cylinders before boxes
+    let is_swapped = rank(first) > rank(second);
+    let (solids, side) = match is_swapped {
+        true => ([b, a], -1.0),
+        false => ([a, b], 1.0),
+    };
+    // this world is active, or the block would have been skipped
+    let always = C::F::c(0.0).lt(C::F::c(1.0));
+    for contact in contacts(solids, margin, search) {
+        let point = Vec3(contact.point.map(C::F::c));
+        let normal = Vec3(contact.normal.map(|x| C::F::c(x * side)));
+        out.add(cx, always, point, C::F::c(contact.distance), normal);
+    }
+    true
+}
+
+/// One instance for all pairs of kinds.
+#[inline(never)]
+fn contacts(solids: [Solid<'_>; 2], margin: f64, search: &ReferenceSearch) -> Contacts {
+    search::contacts(solids, margin, &search.limits)
+}
+
+/// The place of a kind in MuJoCo's order, of those that iterate.
+const fn rank(kind: Kind) -> usize {
+    match kind {
+        Kind::Sphere => 0,
+        Kind::Capsule => 1,
+        Kind::Ellipsoid => 2,
+        Kind::Cylinder => 3,
+        Kind::Box => 4,
+        _ => 5,
+    }
+}
+
+/// A shape of the pair; none where the search has no room for its hull.
+#[inline(always)]
+fn solid<'a, C: Cx>(
+    cx: &mut C,
+    search: &'a ReferenceSearch,
+    kind: Kind,
+    shape: &Shape<C>,
+    axes: &Mat3<C::F>,
+    center: Vec3<C::F>,
+) -> Option<Solid<'a>> {
+    // the numbers of the one world
+    let mut numbers = |v: Vec3<C::F>| v.0.map(|x| cx.reference(x));
+    let mut solid = Solid {
+        form: Form::Sphere,
+        size: numbers(shape.half_extents()),
+        center: numbers(center),
+        axes: [numbers(axes[0]), numbers(axes[1]), numbers(axes[2])],
+    };
+    solid.form = match kind {
+        Kind::Capsule => Form::Capsule,
+        Kind::Ellipsoid => Form::Ellipsoid,
+        Kind::Cylinder => Form::Cylinder,
+        Kind::Box => Form::Box,
+        Kind::Hull => {
+            let row = cx.number(shape.hull());
+            let hull = search.hulls[cx.reference(row).to_usize()].as_ref()?;
+            // MuJoCo's centre of a mesh is the origin of its vertices
+            solid.center = solid.placed(hull.origin);
+            Form::Mesh(hull)
+        }
+        _ => Form::Sphere,
+    };
+    Some(solid)
+}
