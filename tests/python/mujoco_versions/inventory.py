@@ -26,7 +26,7 @@ MODEL = {
         ten_J_* mesh_graph* mesh_poly* mesh_extrema mesh_pos mesh_quat mesh_scale geom_aabb geom_rbound""",
     "derived from what is read": """body_rootid body_jntadr body_jntnum body_dofadr body_dofnum body_geomadr
         body_geomnum body_subtreemass body_contype body_conaffinity body_margin dof_bodyid dof_jntid dof_parentid
-        dof_Madr dof_M0 jnt_actuatorid tendon_actuatorid tendon_type pair_signature actuator_length0
+        dof_Madr dof_M0 tendon_type pair_signature actuator_length0
         actuator_ctrladr actuator_outadr flg_adhesion flg_gravcomp flg_surfacevel sensor_needstage""",
     "no effect in a step": "sensor_noise",
     "refused with flexes (nflex)": "flex*",

@@ -4,6 +4,7 @@ use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::has_flag;
+use super::reflected::{self, Driven};
 use super::tendons::{Tendons, moving};
 use super::tree::softness;
 use crate::description::{
@@ -323,22 +324,30 @@ fn add_springs(
         }
     };
     let stiffness = kept("tendon_stiffness", "mjDSBL_SPRING")?;
-    let damping = kept("tendon_damping", "mjDSBL_DAMPER")?;
+    let mut damping = kept("tendon_damping", "mjDSBL_DAMPER")?;
     let stiffness_curves = file.curves(
         "tendon_stiffnesspoly",
         count,
         has_flag(file, "mjDSBL_SPRING")?,
     )?;
-    let damping_curves = file.curves(
+    let mut damping_curves = file.curves(
         "tendon_dampingpoly",
         count,
         has_flag(file, "mjDSBL_DAMPER")?,
     )?;
-    let armature = match file.has("tendon_armature") {
+    let mut armature = match file.has("tendon_armature") {
         true => file.reals("tendon_armature", count)?,
         false => vec![0.0; count],
     };
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
+    for (k, share) in reflected::shares(file, Driven::Tendon, count)?
+        .iter()
+        .enumerate()
+    {
+        armature[k] += share.armature;
+        damping[k] += share.damping;
+        damping_curves[k] = share.damped(damping_curves[k]);
+    }
     let acts = |&k: &usize| {
         [stiffness[k], damping[k], armature[k]] != [0.0; 3]
             || [stiffness_curves[k], damping_curves[k]] != [[0.0; 2]; 2]

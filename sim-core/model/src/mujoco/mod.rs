@@ -19,6 +19,7 @@ mod options;
 mod pairs;
 mod passive;
 mod rays;
+mod reflected;
 mod refusals;
 mod sensors;
 mod tendons;

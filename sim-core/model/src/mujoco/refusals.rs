@@ -6,6 +6,7 @@ use super::format::ModelFile;
 use super::names::names;
 use super::options::has_flag;
 use super::pairs;
+use super::reflected::{self, Driven};
 use crate::error::ModelError;
 use crate::softness::POWER_MAX;
 
@@ -18,9 +19,6 @@ const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("geom", "geom_surfacevel", "surface velocity"),
     ("tendon", "tendon_springyield", "plastic springs"),
     ("actuator", "actuator_delay", "a delay"),
-    ("actuator", "actuator_armature", "armature of an actuator"),
-    ("actuator", "actuator_damping", "damping of an actuator"),
-    ("actuator", "actuator_dampingpoly", "damping of an actuator"),
 ];
 
 /// Flags of `<option>` that are supported. All others are refused, also those that a newer MuJoCo brings.
@@ -236,6 +234,7 @@ fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
         true => file.reals("tendon_armature", count)?,
         false => vec![0.0; count],
     };
+    let shares = reflected::shares(file, Driven::Tendon, count)?;
     for (k, name) in names.iter().enumerate() {
         let first = firsts[k].max(0);
         let rows =
@@ -247,7 +246,8 @@ fn tendons(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
         // as MuJoCo's compiler refuses it
         let bends =
             |&row: &usize| matches!(kinds[row].as_str(), "mjWRAP_SPHERE" | "mjWRAP_CYLINDER");
-        if armatures[k] != 0.0 && rows.iter().any(bends) {
+        let is_heavy = armatures[k] != 0.0 || shares[k].armature != 0.0;
+        if is_heavy && rows.iter().any(bends) {
             refused.push(no("tendon", name, "armature where it bends around a geom"));
         }
     }

@@ -6,6 +6,7 @@ use super::frame;
 use super::frames;
 use super::names::names;
 use super::options::{MujocoOptions, has_flag, integrator};
+use super::reflected::{self, Driven, Share};
 use super::{passive, tendons};
 use crate::description::{
     Compensator, Inertial, Joint, JointDof, JointExtras, JointKind, Link, Precompiled, Robot,
@@ -176,6 +177,7 @@ struct JointArrays {
     damping: Vec<f64>,
     damping_curves: Vec<[f64; 2]>,
     armature: Vec<f64>,
+    shares: Vec<Share>,
     friction: Vec<f64>,
     frictions: Vec<Softness>,
     qpos0: Vec<f64>,
@@ -230,6 +232,7 @@ impl JointArrays {
             damping: kept(file.reals("dof_damping", dofs)?, dampers_off),
             damping_curves: file.curves("dof_dampingpoly", dofs, dampers_off)?,
             armature: file.reals("dof_armature", dofs)?,
+            shares: reflected::shares(file, Driven::Joint, joints)?,
             friction: kept(file.reals("dof_frictionloss", dofs)?, friction_off),
             frictions: softness(file, "dof", dofs)?,
             qpos0: file.reals("qpos0", coords)?,
@@ -331,18 +334,24 @@ impl JointArrays {
                 joint.range = (self.is_limited[k] != 0).then_some(self.ranges[k]);
             }
         }
+        let share = self.shares[k];
         joint.dofs = (dof..dof + dofs)
             .map(|dof| JointDof {
-                damping: self.damping[dof],
+                damping: self.damping[dof] + share.damping,
                 friction: self.friction[dof],
-                armature: self.armature[dof],
+                armature: self.armature[dof] + share.armature,
                 target_q: Some(0.0),
                 ..JointDof::default()
             })
             .collect();
         let is_scalar = dofs == 1;
         let mut damping_curves = [[0.0; 2]; 6];
-        damping_curves[..dofs].copy_from_slice(&self.damping_curves[dof..dof + dofs]);
+        for (curve, known) in damping_curves
+            .iter_mut()
+            .zip(&self.damping_curves[dof..dof + dofs])
+        {
+            *curve = share.damped(*known);
+        }
         let extras = JointExtras {
             anchor: if kind == JointKind::Free {
                 [0.0; 3]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco import reflected
 from tightloop.mujoco.batch import gains, masses, varied_fields
 from tightloop.mujoco.batch.library import mujoco
 
@@ -187,7 +188,7 @@ class Expansions:
             if not self._is_parameter(name):
                 continue
             if name in _SAME:
-                found[_SAME[name]] = array.astype(np.float64) * self._switch(name)
+                found[_SAME[name]] = (array.astype(np.float64) + self._share(name)) * self._switch(name)
             elif name in gains.PARAMS:
                 found[gains.PARAMS[name]] = gains.factors(self._model, name, array)
             elif name in varied_fields.FIELDS:
@@ -208,6 +209,13 @@ class Expansions:
         if "dof_invweight0" in self._arrays:
             found["dof_invweight0"] = self._arrays["dof_invweight0"].astype(np.float64)
         return found
+
+    def _share(self, name: str) -> Array | float:
+        """Return what actuators of the model add to a field of dofs, ``(nv,)``."""
+        if name not in ("dof_armature", "dof_damping"):
+            return 0.0
+        armature, damping = reflected.shares(self._model)
+        return armature if name == "dof_armature" else damping[:, 0]
 
     def _switch(self, name: str) -> float:
         flags = [getattr(mujoco.mjtDisableBit, flag, 0) for flag in _SWITCHES.get(name, ())]

@@ -12,7 +12,7 @@ import numpy as np
 
 import tightloop as tl
 from tightloop.errors import ArgumentError, SceneError
-from tightloop.mujoco import export
+from tightloop.mujoco import export, reflected
 from tightloop.scene.options import Solver
 from tightloop.tasks.legged_models.skeleton import Hinge, Source
 
@@ -155,6 +155,7 @@ def _alone(spec: Any, what: str) -> Any:
     if not bodies or max(counts) == 0:
         raise ArgumentError(f"{what}: it has no joints; give the model of a robot")
     robot = bodies[counts.index(max(counts))]
+    _keep_shares(spec)
     # what may name something that goes
     for element in [*spec.keys, *spec.sensors, *spec.actuators, *spec.cameras, *spec.lights]:
         spec.delete(element)
@@ -171,18 +172,35 @@ def _alone(spec: Any, what: str) -> Any:
     return robot
 
 
+def _keep_shares(spec: Any) -> None:
+    """Give joints the armature and damping that their actuators, which go, add to them."""
+    mujoco: Any = import_module("mujoco")
+
+    joints = {joint.name: joint for joint in spec.joints}
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    for actuator in spec.actuators:
+        # older versions of MuJoCo have no such actuators
+        if actuator.trntype not in kinds or not hasattr(actuator, "armature"):
+            continue
+        joint, square = joints[actuator.target], float(actuator.gear[0]) ** 2
+        joint.armature += square * actuator.armature
+        joint.damping[:] = np.add(joint.damping, square * np.asarray(actuator.damping))
+
+
 def _hinges(model: Any, spec: Any) -> list[Hinge]:
     """The hinge joints of the whole model."""
     mujoco: Any = import_module("mujoco")
 
     found: dict[str, Hinge] = {}
+    shares = reflected.shares(model)
     for place, joint in enumerate(spec.joints):
         if model.jnt_type[place] != mujoco.mjtJoint.mjJNT_HINGE:
             continue
         dof = model.jnt_dofadr[place]
         low, high = model.jnt_range[place] if model.jnt_limited[place] else (-math.inf, math.inf)
         effort = float(model.jnt_actfrcrange[place, 1]) if model.jnt_actfrclimited[place] else math.inf
-        armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
+        armature, damping = (float(share) for share in (shares[0][dof], shares[1][dof, 0]))
+        armature, damping = armature + float(model.dof_armature[dof]), damping + float(model.dof_damping[dof])
         found[joint.name] = Hinge(joint.name, float(low), float(high), effort, armature, damping)
     names = list(found)
     by_place = {place: joint.name for place, joint in enumerate(spec.joints) if joint.name in found}

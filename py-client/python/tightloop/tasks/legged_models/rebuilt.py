@@ -6,8 +6,10 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tightloop.errors import ArgumentError
+from tightloop.mujoco import reflected
 
 
 def rebuilt(model: Any) -> Any:
@@ -39,8 +41,9 @@ def rebuilt(model: Any) -> Any:
             body.ipos, body.iquat = model.body_ipos[place], model.body_iquat[place]
         body.gravcomp = model.body_gravcomp[place]
         bodies.append(body)
+    shares = reflected.shares(model)
     for place in range(model.njnt):
-        _joint(bodies[model.jnt_bodyid[place]], model, place)
+        _joint(bodies[model.jnt_bodyid[place]], model, place, shares)
     for place in range(model.ngeom):
         if mujoco.mjtGeom(model.geom_type[place]) not in (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF):
             _geom(bodies[model.geom_bodyid[place]], model, place, meshes)
@@ -63,7 +66,7 @@ def _mesh(spec: Any, model: Any, place: int) -> str:
     return mesh.name
 
 
-def _joint(body: Any, model: Any, place: int) -> None:
+def _joint(body: Any, model: Any, place: int, shares: tuple[NDArray[Any], NDArray[Any]]) -> None:
     mujoco: Any = import_module("mujoco")
 
     dof, coord = model.jnt_dofadr[place], model.jnt_qposadr[place]
@@ -77,8 +80,10 @@ def _joint(body: Any, model: Any, place: int) -> None:
     joint.actfrclimited, joint.actfrcrange = bool(model.jnt_actfrclimited[place]), model.jnt_actfrcrange[place]
     joint.solref_limit, joint.solimp_limit = model.jnt_solref[place], model.jnt_solimp[place]
     joint.solref_friction, joint.solimp_friction = model.dof_solref[dof], model.dof_solimp[dof]
-    joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]
-    joint.damping[0], joint.stiffness[0] = model.dof_damping[dof], model.jnt_stiffness[place]
+    # what actuators add stays without them
+    armature, damping = (share[dof] for share in shares)
+    joint.armature, joint.frictionloss = model.dof_armature[dof] + armature, model.dof_frictionloss[dof]
+    joint.damping[0], joint.stiffness[0] = model.dof_damping[dof] + damping[0], model.jnt_stiffness[place]
     if kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
         joint.ref, joint.springref = model.qpos0[coord], model.qpos_spring[coord]
 
