@@ -162,8 +162,10 @@ pub struct ContactPair {
     pub name: String,
     /// Their links, each with the place of the geom among the link's shapes.
     pub geoms: [(usize, usize); 2],
-    /// How they touch.
+    /// How they touch; friction is that of the first tangent.
     pub contact: GeomContact,
+    /// Sliding friction along the second tangent, and rolling friction about it [–, m].
+    pub second: [f64; 2],
     /// `solref` of friction where the cone is elliptic; none where it is that of the contact.
     pub sliding: Option<[f64; 2]>,
 }

@@ -33,6 +33,7 @@ view! {
         Later { "fields": fields }
         Always { "memory": memory }
         Later { "turning": turning }
+        Later { "skew": skew }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         Never { "ordered_corners": ordered_corners }

@@ -58,7 +58,7 @@ pub(super) fn add_pairs(
         let [Some(first), Some(second)] = geoms.map(|geom| places[geom]) else {
             return Err(file.fault("has a pair without its geoms".to_owned()));
         };
-        let [slide, _, twist, roll, _] = frictions[k];
+        let [slide, across, twist, roll, roll_across] = frictions[k];
         parts.pairs.push(ContactPair {
             name: names[k].clone(),
             geoms: [first, second],
@@ -73,6 +73,7 @@ pub(super) fn add_pairs(
                 margin: margins[k],
                 gap: gaps[k],
             },
+            second: [across, roll_across],
             sliding: (sliding[k] != [0.0; 2]).then_some(sliding[k]),
         });
     }
@@ -89,23 +90,13 @@ pub(super) fn refuse(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), 
     let count = pairs.len();
     let names = names(file, "pair", count)?;
     let condims = file.integers("pair_dim", count)?;
-    let frictions = file.vectors::<5>("pair_friction", count)?;
     let solimps = file.vectors::<5>("pair_solimp", count)?;
     for k in 0..count {
         let name = &names[k];
-        let [first, second, _, about_first, about_second] = frictions[k];
         let wrong = [
             (
                 !matches!(condims[k], 1 | 3 | 4 | 6),
                 "a condim other than 1, 3, 4 and 6",
-            ),
-            (
-                condims[k] > 1 && first != second,
-                "sliding friction that differs between the two tangents",
-            ),
-            (
-                condims[k] > 4 && about_first != about_second,
-                "rolling friction that differs between the two tangents",
             ),
             (
                 pairs[..k].contains(&pairs[k]),

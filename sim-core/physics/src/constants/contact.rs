@@ -58,6 +58,8 @@ recast! {
         pub memory: Memory,
         /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
         pub turning: Fixed,
+        /// How friction differs between the tangents of each pair ([`skew`]); without rows where it differs in none.
+        pub skew: Fixed,
         /// How the friction of two shapes combines.
         pub combine: FrictionCombine,
         /// Of each pair, which friction counts ([`rule`]); without rows where all combine, or all have the larger one.
@@ -164,6 +166,16 @@ pub mod soft {
     pub const IMPEDANCE: usize = 3;
     /// Columns.
     pub const COLUMNS: usize = 7;
+}
+
+/// Columns of the table of pairs whose friction differs between the tangents.
+pub mod skew {
+    /// Sliding friction along the second tangent over that along the first, which scales the second tangent itself [–].
+    pub const SLIDE: usize = 0;
+    /// Rolling friction about the second tangent over that about the first, and over `SLIDE` [–].
+    pub const ROLL: usize = 1;
+    /// Columns.
+    pub const COLUMNS: usize = 2;
 }
 
 /// Which friction of two shapes counts for a pair, where it varies.
@@ -583,6 +595,7 @@ impl<R: Real> Contacts<R> {
                 len: 0,
             },
             turning: Fixed::default(),
+            skew: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
             has_rules: false,
@@ -595,6 +608,12 @@ impl<R: Real> Contacts<R> {
             impedances: PairImpedances::default(),
             bodies: TouchedBodies::default(),
         }
+    }
+
+    /// Do forces depend on the directions of the tangents?
+    #[inline(always)]
+    pub fn has_directions(&self) -> bool {
+        self.cone == Cone::Pyramidal || self.skew.rows > 0
     }
 
     /// Does any class reach beyond the pattern of the mass matrix?

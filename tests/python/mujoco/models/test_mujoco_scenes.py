@@ -178,8 +178,8 @@ def test_commands_are_checked(model):
         (
             '<worldbody><geom name="f" type="plane" size="1 1 1"/>'
             '<body><freejoint/><geom name="g" size=".1"/></body></worldbody>'
-            '<contact><pair name="p" geom1="f" geom2="g" friction="1 .5 .1 .1 .1"/></contact>',
-            ["pair `p`: no support for sliding friction that differs between the two tangents"],
+            '<contact><pair name="p" geom1="f" geom2="g" solimp=".9 .95 .001 .5 40"/></contact>',
+            ["pair `p`: no support for a solimp with the power 40"],
         ),
         (
             '<option integrator="discrete"/><worldbody><body><joint/><geom size=".1"/></body></worldbody>',

@@ -25,6 +25,8 @@ AXES = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 _SLIDING = 3
 #: Columns of ``geom_friction`` as parameters: of sliding, torsion and rolling.
 _FRICTIONS = ("shape_mu", "shape_mu_torsional", "shape_mu_rolling")
+#: Least coefficient of friction (MuJoCo: ``mjMINMU``).
+_MU_MIN = 1e-5
 #: Place of the power in ``solimp``.
 _POWER = 4
 
@@ -111,9 +113,16 @@ def _pair_friction(model: Any, friction: Array, shapes: list[int]) -> Values:
     return {name: friction[..., [0, 2, 3]].astype(np.float64) for name in _pair_friction_params(model)}
 
 
-def _turned_frictions(model: Any, friction: Array) -> Array:
+def _other_ratios(model: Any, friction: Array) -> Array:
+    """Return which pairs have another ratio of the two tangents than the model, up to rounding."""
     slides, rolls = np.asarray(model.pair_dim) > 1, np.asarray(model.pair_dim) > _SLIDING + 1
-    differs = slides & (friction[..., 0] != friction[..., 1]) | rolls & (friction[..., 3] != friction[..., 4])
+    differs = np.zeros(friction.shape[:-1], bool)
+    for counts, first in ((slides, 0), (rolls, 3)):
+        fixed, given = (
+            np.maximum(values[..., first + 1], _MU_MIN) / np.maximum(values[..., first], _MU_MIN)
+            for values in (model.pair_friction, friction)
+        )
+        differs |= counts & (np.abs(given - fixed) > 4 * np.finfo(friction.dtype).eps * fixed)
     return np.repeat(differs[..., None], friction.shape[-1], axis=-1)
 
 
@@ -139,8 +148,8 @@ FIELDS = {
     "pair_friction": Field(
         _pair_friction_params,
         _pair_friction,
-        _turned_frictions,
-        "differs between the two tangents of a pair; write equal ones",
+        _other_ratios,
+        "of the two tangents has another ratio than the model's; multiply both by the same",
     ),
 }
 #: Fields whose values are of geoms, of which a simulation has shapes.

@@ -18,7 +18,7 @@ use pieces::{PlacedShape, Rules, contacts_of, named_pair, pairs, pieces};
 use sensors::add_touched_bodies;
 use sim_physics::constants::contact::{
     Class, Column, Cone, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run,
-    VaryingSurfaces, pair, row, rule,
+    VaryingSurfaces, pair, row, rule, skew,
 };
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::constants::params::Param;
@@ -161,6 +161,7 @@ impl ContactBuilder<'_> {
             };
             contacts.tables.numbers.extend(ratios.as_flattened());
         }
+        self.add_skew(contacts, pairs);
         self.add_combine(contacts, pairs);
         self.add_mixing(contacts, pairs);
         self.add_named_pairs(contacts, pairs);
@@ -216,7 +217,9 @@ impl ContactBuilder<'_> {
                 Cone::Pyramidal if varies => 4.0 * EDGES_MAX,
                 Cone::Pyramidal => 4.0 * edge_stiffness(impratio, mu).min(EDGES_MAX),
             };
-            d / (1.0 - d) * ratio > STIFFNESS_MAX
+            // and a longer tangent is stiffer by its square
+            let longest = self.skew(pair)[skew::SLIDE].max(1.0);
+            d / (1.0 - d) * ratio * longest * longest > STIFFNESS_MAX
         })
     }
 

@@ -7,8 +7,9 @@ use crate::description::Description;
 use crate::geom_contact::GeomContact;
 use crate::softness::Softness;
 use crate::surface::Surface;
-use sim_physics::constants::contact::{Cone, Kind, MU_MIN, Pair, WEIGHT_MIN, pair};
+use sim_physics::constants::contact::{Cone, Contacts, Kind, MU_MIN, Pair, WEIGHT_MIN, pair, skew};
 use sim_physics::constants::{Constants, Impedance};
+use sim_physics::lane::Fixed;
 
 /// What the tables of contacts are built from.
 pub(super) struct ContactBuilder<'a> {
@@ -165,6 +166,41 @@ impl ContactBuilder<'_> {
             4 => [twist / slide, 0.0],
             _ => [0.0; 2],
         }
+    }
+
+    /// Notes how friction differs between the tangents, if it does in any pair.
+    pub(super) fn add_skew(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) {
+        let skews: Vec<_> = pairs.iter().map(|&pair| self.skew(pair)).collect();
+        if skews.iter().all(|skew| *skew == [1.0; skew::COLUMNS]) {
+            return;
+        }
+        contacts.skew = Fixed {
+            base: contacts.tables.numbers.len(),
+            stride: skew::COLUMNS,
+            rows: pairs.len(),
+        };
+        contacts.tables.numbers.extend(skews.as_flattened());
+    }
+
+    /// How the friction of a pair differs between the tangents, by the columns of its table.
+    pub(super) fn skew(&self, (a, b): (usize, usize)) -> [f64; skew::COLUMNS] {
+        let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        let Some(pair) = named_pair(x, y, self.rules) else {
+            return [1.0; skew::COLUMNS];
+        };
+        // friction over friction, as MuJoCo bounds both
+        let over = |second: f64, first: f64| second.max(MU_MIN) / first.max(MU_MIN);
+        let [first, _, about_first] = pair.contact.friction;
+        let [second, about_second] = pair.second;
+        let slide = match pair.contact.condim {
+            1 => 1.0,
+            _ => over(second, first),
+        };
+        let roll = match pair.contact.condim {
+            6 => over(about_second, about_first),
+            _ => 1.0,
+        };
+        [slide, roll / slide]
     }
 
     /// The impedance of a pair's contacts.

@@ -34,7 +34,7 @@ use super::{BlockOf, ConstantsOf, Stage};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::{
-    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Cone, Contacts, Kind, pair, surface,
+    COUNT_CONTACTS, COUNT_LEFT_OUT, COUNT_ROWS, Contacts, Kind, pair, surface,
 };
 use crate::constants::pair_groups::BLOCK;
 use crate::lane::{Cx, MaskOf, Num, Real, Table};
@@ -385,8 +385,8 @@ fn points_of<C: Cx>(
         mu,
         varying: varying(cx, t, p, mu),
         softness: softness(cx, t, p),
-        // the forces of a pyramidal cone depend on the tangents' direction
-        along: (t.cone == Cone::Pyramidal).then_some(Vec3([C::F::c(0.0); 3])),
+        // the forces of a pyramidal cone depend on the tangents' direction, as does friction that differs between them
+        along: t.has_directions().then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {
             counts: t.memory.counts,
             contacts: t.classes.len() + COUNT_CONTACTS,

@@ -7,10 +7,15 @@
 //! pyramidal     R₀ = (1 - d)/d w (1 + μ²)  D = 1 / (2 μ² R₀ / impratio), of the edges n ± μ t
 //! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
 //! ```
+//!
+//! μ is that of the first tangent. Where the second one has another, it is as long as the ratio of both: cones are round then.
+//! Rotations are scaled alike, by their friction over μ. A force along a scaled row is in units of that row.
 
 use super::joint_rows::{impedance, impedance_between};
 use crate::arrays::Array as A;
-use crate::constants::contact::{COUNT_LEFT_OUT, Class, Cone, Contacts, pair, row, soft, turning};
+use crate::constants::contact::{
+    COUNT_LEFT_OUT, Class, Cone, Contacts, pair, row, skew, soft, turning,
+};
 use crate::constants::{Constants, Impedance};
 use crate::each;
 use crate::lane::{Cx, Num, Real};
@@ -78,7 +83,7 @@ struct Contact<'a, C: Cx> {
     point: Vec3<C::F>,
     /// 1 with friction, 0 without.
     rubs: C::F,
-    /// Normal and two tangents; the tangents are 0 without friction.
+    /// Normal and two tangents, of which the second is scaled; the tangents are 0 without friction.
     frame: [Vec3<C::F>; 3],
 }
 
@@ -92,12 +97,16 @@ impl<'a, C: Cx> Contact<'a, C> {
         let pair = cx.load(t.memory.rows, r, row::PAIR);
         // pairs of one class may differ in whether they have friction
         let rubs = shared(cx, t, class, pair, pair::RUBS);
-        // a pyramid depends on its tangents' directions: the narrow phase chose the first
-        let along = match t.cone {
-            Cone::Elliptic => None,
-            Cone::Pyramidal => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
+        // where directions matter, the narrow phase chose the first
+        let along = match t.has_directions() {
+            false => None,
+            true => Some(load_vec3(cx, t.memory.rows, r, row::TANGENTS)),
         };
-        let tangents = tangents(normal, along);
+        let mut tangents = tangents(normal, along);
+        // |t₂| is the friction along it over that along t₁
+        if t.skew.rows > 0 {
+            tangents[1] = tangents[1] * cx.pick(t.skew, pair, skew::SLIDE);
+        }
         Contact {
             t,
             class,
@@ -182,7 +191,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             *scaled = ratio * self.rubs;
         }
         let [twist, roll] = ratios;
-        let scales = [twist, roll, roll];
+        let scales = [twist, roll, second_roll(cx, t, self.pair, roll)];
         let mut velocity = [zero; 3];
         // J(i, dof) = ± scale (axis · ω)
         for (c, column) in self.class.columns.iter().enumerate() {
@@ -318,6 +327,31 @@ impl<'a, C: Cx> Contact<'a, C> {
             *x = C::F::select(pushes, *x, zero);
         }
         cx.fill_all(t.memory.rows, r, row::AREF, aref);
+    }
+}
+
+/// Torsional friction and rolling friction about both tangents over that of sliding: what scales the torques of a contact.
+#[inline(always)]
+pub(in crate::step) fn turning_scales<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    pair: C::F,
+) -> Vec3<C::F> {
+    let (twist, roll) = (cx.pick(t.turning, pair, 0), cx.pick(t.turning, pair, 1));
+    Vec3([twist, roll, second_roll(cx, t, pair, roll)])
+}
+
+/// What scales rotations about the second tangent, from what scales those about the first.
+#[inline(always)]
+fn second_roll<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    pair: C::F,
+    roll: C::F,
+) -> C::F {
+    match t.skew.rows > 0 {
+        true => roll * cx.pick(t.skew, pair, skew::ROLL),
+        false => roll,
     }
 }
 

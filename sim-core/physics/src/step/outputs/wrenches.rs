@@ -19,7 +19,7 @@ use crate::each;
 use crate::lane::{Cx, Num, Real, map};
 use crate::math::spatial::{ANGULAR, Spatial};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
-use crate::step::constraints::contact_rows::class_list;
+use crate::step::constraints::contact_rows::{class_list, turning_scales};
 use crate::step::constraints::tied_frames;
 use crate::step::tree::inverse_dynamics::{point_acceleration, proper_accelerations};
 use crate::step::{BlockOf, ConstantsOf, Stage, masses};
@@ -262,13 +262,9 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
     // torsional and rolling rows are scaled by their friction over that of sliding, so a torque is too
     if let Some(block) = t.classes[number].turns {
         let pair = cx.load(rows, r, row::PAIR);
-        let twist = cx.pick(t.turning, pair, 0);
-        let roll = cx.pick(t.turning, pair, 1);
-        let scaled = load_vec3(cx, rows, r, block + turning::FORCE);
-        torque = frame.mul_add(
-            Vec3([scaled[0] * twist, scaled[1] * roll, scaled[2] * roll]),
-            Vec3::zero(),
-        );
+        let Vec3([x, y, z]) = load_vec3(cx, rows, r, block + turning::FORCE);
+        let Vec3([twist, first, second]) = turning_scales(cx, t, pair);
+        torque = frame.mul_add(Vec3([x * twist, y * first, z * second]), Vec3::zero());
     }
     [point, frame.mul_add(force, Vec3::zero()), torque]
 }

@@ -22,7 +22,7 @@ use crate::constants::sensors::{ContactSensor, Reduction, Sensor, SensorKind, To
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num, Real, map};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
-use crate::step::constraints::contact_rows::{class_list, tangents};
+use crate::step::constraints::contact_rows::{class_list, tangents, turning_scales};
 use crate::step::outputs::sites::{position, reference, to_local};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
@@ -108,10 +108,9 @@ fn contact<C: Cx>(
     let mut torque = Vec3::zero();
     // torsional and rolling rows are scaled by their friction over that of sliding, so a torque is too
     if let Some(block) = t.classes[class].turns {
-        let twist = cx.pick(t.turning, pair, 0);
-        let roll = cx.pick(t.turning, pair, 1);
         let Vec3([x, y, z]) = load_vec3(cx, rows, r, block + turning::FORCE);
-        torque = Vec3([x * twist, y * roll, z * roll]);
+        let Vec3([twist, first, second]) = turning_scales(cx, t, pair);
+        torque = Vec3([x * twist, y * first, z * second]);
     }
     // rows have points from the reference point of the second tree
     let there = b.work.reference[t.classes[class].trees.1];

@@ -8,8 +8,9 @@
 
 use super::ball;
 use super::rubbing::{change_force, directions, exists, place, slope_and_row, write_step};
-use crate::constants::contact::{row, turning};
+use crate::constants::contact::{row, skew, turning};
 use crate::lane::{Cx, Num, Real};
+use crate::step::constraints::contact_rows::turning_scales;
 use crate::step::solver::contacts::{ClassOf, ContactsOf};
 use crate::step::{BlockOf, ConstantsOf};
 
@@ -120,14 +121,17 @@ pub(super) fn squares<C: Cx>(cx: &mut C, t: &ContactsOf<C>, class: &ClassOf<C>, 
     normal.fma(normal, sum * ratio)
 }
 
-/// Friction of a direction over that of sliding, as the model has it.
+/// Friction of a direction over that of the first tangent, as the model has it.
 #[inline(always)]
 fn ratio<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, direction: usize) -> C::F {
-    let column = match direction {
-        0 | 1 => return C::F::c(1.0),
-        2 => 0,
-        _ => 1,
-    };
     let pair = cx.load(t.memory.rows, r, row::PAIR);
-    cx.pick(t.turning, pair, column)
+    let mut ratio = match direction {
+        0 | 1 => C::F::c(1.0),
+        _ => turning_scales(cx, t, pair)[direction - 2],
+    };
+    // a second tangent that is scaled scales rotations about it, too
+    if t.skew.rows > 0 && matches!(direction, 1 | 4) {
+        ratio = ratio * cx.pick(t.skew, pair, skew::SLIDE);
+    }
+    ratio
 }
