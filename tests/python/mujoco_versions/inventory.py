@@ -32,7 +32,6 @@ MODEL = {
     "refused with flexes (nflex)": "flex*",
     "refused with plugins (nplugin)": "plugin* *_plugin",
     "of pictures of height fields": "hfield_pathadr",
-    "refused with actuators of those laws": "actuator_ctrlspec",
     "refused with delays": "actuator_history* sensor_history*",
     "refused with the flag for sleep": "tree_sleep_policy dof_length",
     "refused with plastic springs": "jnt_plasticadr tendon_plasticadr key_plastic",

@@ -230,7 +230,8 @@ REFUSED = {
     "override": Refused((3, 11), '<option><flag override="enable"/></option>' + _FALL.format(""), "mjENBL_OVERRIDE"),
     "DC motors": Refused(
         (3, 11),
-        _SPRING.format("") + '<actuator><dcmotor name="a" joint="j" motorconst="0.05" resistance="1"/></actuator>',
+        _SPRING.format("")
+        + '<actuator><dcmotor name="a" joint="j" motorconst="0.05" resistance="1" lugre="9 1 .1 .2 1"/></actuator>',
         "actuator `a`: no support for",
     ),
     "integrator": Refused(

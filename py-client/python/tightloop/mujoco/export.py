@@ -67,7 +67,8 @@ _NEWER_ARRAYS = """
     jnt_stiffnesspoly jnt_springyield dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature
     tendon_dampingpoly tendon_stiffnesspoly tendon_springyield pair_adhesion tendon_actfrclimited tendon_actfrcrange
     actuator_delay actuator_armature actuator_damping
-    actuator_dampingpoly jnt_actuatorid tendon_actuatorid actuator_ctrlnum actuator_outnum
+    actuator_dampingpoly jnt_actuatorid tendon_actuatorid actuator_ctrlnum actuator_ctrlspec
+    actuator_outnum
     sensor_delay sensor_interval sensor_intprm
 """.split()
 # Enumerations: the array and its type.

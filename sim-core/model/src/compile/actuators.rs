@@ -50,6 +50,7 @@ pub(super) fn add(to: &mut Actuators<f64>, actuator: &description::Actuator, sce
         bias: actuator.bias,
         muscle_gain: actuator.muscle_gain.clone(),
         muscle_bias: actuator.muscle_bias.clone(),
+        motor: actuator.motor.clone(),
     });
 }
 
@@ -80,6 +81,7 @@ fn activation(activation: &ActuatorActivation, place: usize, dt: f64) -> Activat
         reach: match activation.rate {
             // ȧ T (1 - exp(-h/T))
             ActivationRate::Filter(time) if activation.exact => -time * (-dt / time).exp_m1(),
+            ActivationRate::Current(time) => -time * (-dt / time).exp_m1(),
             _ => dt,
         },
         range: activation.range,

@@ -7,7 +7,7 @@ use super::tendons::SpatialTendon;
 use crate::geom_contact::GeomContact;
 use crate::pose::Pose;
 use crate::softness::Softness;
-use sim_physics::constants::actuators::{ActivationRate, Muscle};
+use sim_physics::constants::actuators::{ActivationRate, Motor, Muscle};
 use sim_physics::constants::hull::reference::Limits;
 use sim_physics::constants::options::Integrator;
 
@@ -203,6 +203,8 @@ pub struct Actuator {
     pub muscle_gain: Option<Muscle<f64>>,
     /// In place of that bias, a muscle's.
     pub muscle_bias: Option<Muscle<f64>>,
+    /// What a DC motor has besides.
+    pub motor: Option<Motor<f64>>,
 }
 
 /// Along which an actuator acts.

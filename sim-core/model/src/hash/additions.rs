@@ -3,8 +3,8 @@
 //! The first release kept these constants together, for models from MuJoCo alone.
 
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, Adhesion, LengthKind, Muscle,
-    MuscleRate, Sites, SliderCrank, TendonBound, TurningLength,
+    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, Adhesion, LengthKind, Motor,
+    Muscle, MuscleRate, Sites, SliderCrank, TendonBound, TurningLength,
 };
 use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
 use sim_physics::constants::lengths::{Length, Term};
@@ -236,7 +236,16 @@ view! {
             "gain": gain,
             "bias": bias,
         }
-        Later { "muscle_gain": muscle_gain, "muscle_bias": muscle_bias };
+        Later { "muscle_gain": muscle_gain, "muscle_bias": muscle_bias }
+        Later { "motor": motor };
+    Motor<f64> as "Motor":
+        Always {
+            "constant": constant,
+            "per_volt": per_volt,
+            "voltage": voltage,
+            "current_rate": current_rate,
+            "cogging": cogging,
+        };
     Muscle<f64> as "Muscle":
         Always {
             "peak": peak,
@@ -342,6 +351,7 @@ impl View for ActivationRate<f64> {
             ActivationRate::Control => text.put("Control"),
             ActivationRate::Filter(time) => text.tuple("Filter", &[time]),
             ActivationRate::Muscle(rate) => text.tuple("Muscle", &[rate]),
+            ActivationRate::Current(time) => text.tuple("Current", &[time]),
         }
     }
 }

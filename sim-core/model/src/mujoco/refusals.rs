@@ -1,6 +1,7 @@
 //! What a model has that the physics does not: each by the name of its element.
 
 use super::actuators::laws;
+use super::actuators::motors::Motors;
 use super::actuators::muscles::Muscles;
 use super::format::ModelFile;
 use super::names::names;
@@ -261,9 +262,20 @@ const DYNAMICS: &[&str] = &[
     "mjDYN_FILTER",
     "mjDYN_FILTEREXACT",
     "mjDYN_MUSCLE",
+    "mjDYN_DCMOTOR",
 ];
-const GAINS: &[&str] = &["mjGAIN_FIXED", "mjGAIN_AFFINE", "mjGAIN_MUSCLE"];
-const BIASES: &[&str] = &["mjBIAS_NONE", "mjBIAS_AFFINE", "mjBIAS_MUSCLE"];
+const GAINS: &[&str] = &[
+    "mjGAIN_FIXED",
+    "mjGAIN_AFFINE",
+    "mjGAIN_MUSCLE",
+    "mjGAIN_DCMOTOR",
+];
+const BIASES: &[&str] = &[
+    "mjBIAS_NONE",
+    "mjBIAS_AFFINE",
+    "mjBIAS_MUSCLE",
+    "mjBIAS_DCMOTOR",
+];
 
 fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError> {
     let count = file.rows("actuator_trntype");
@@ -276,6 +288,7 @@ fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
     let controls = file.integers_or("actuator_ctrlnum", count, 1)?;
     let outputs = file.integers_or("actuator_outnum", count, 1)?;
     let muscles = Muscles::read(file, count)?;
+    let motors = Motors::read(file, count)?;
     for k in 0..count {
         let transmission = match transmissions[k].as_str() {
             "mjTRN_JOINT"
@@ -299,8 +312,10 @@ fn actuators(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
         if is_muscle && !muscles.is_whole(k) {
             refused.push(no("actuator", name, "a muscle without a range of lengths"));
         }
+        let motor = motors.refused(k).into_iter();
+        refused.extend(motor.map(|what| no("actuator", name, what)));
         if controls[k] != 1 || outputs[k] != 1 || states[k] > 1 {
-            let several = "several controls, outputs or activations";
+            let several = "another number of controls, outputs or activations than one";
             refused.push(no("actuator", name, several));
         }
     }
@@ -319,11 +334,12 @@ fn adhesions(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
         let follows = laws
             .iter()
             .any(|(kinds, factors)| kinds[k].ends_with("_AFFINE") && factors[k][2] != 0.0);
-        let is_muscle = laws.iter().any(|(kinds, _)| kinds[k].ends_with("_MUSCLE"));
+        let is = |law: &str| laws.iter().any(|(kinds, _)| kinds[k].ends_with(law));
         let wrong = [
             (targets[k][0] == 0, "adhesion of the world"),
             (follows, "adhesion by a force that depends on velocity"),
-            (is_muscle, "adhesion by a muscle"),
+            (is("_MUSCLE"), "adhesion by a muscle"),
+            (is("_DCMOTOR"), "adhesion by a DC motor"),
         ];
         let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
         refused.extend(wrong.map(|(_, what)| no("actuator", &names[k], what)));

@@ -59,6 +59,25 @@ recast! {
         pub muscle_gain: Option<Muscle<R>>,
         /// In place of that bias, a muscle's.
         pub muscle_bias: Option<Muscle<R>>,
+        /// What a DC motor has besides, with gain and bias for its torque without inductance and bounds.
+        pub motor: Option<Motor<R>>,
+    }
+}
+
+recast! {
+    /// A DC motor (MuJoCo: `actuator/dcmotor`).
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Motor<R> {
+        /// Torque per current, and voltage per velocity: K [N·m/A, V·s/rad].
+        pub constant: R,
+        /// K over the resistance [N·m/V].
+        pub per_volt: R,
+        /// Largest voltage that its controller gives it, if there is a bound [V].
+        pub voltage: Option<R>,
+        /// How fast its current changes at most, if there is a bound [A/s].
+        pub current_rate: Option<R>,
+        /// Amplitude [N·m], cycles per turn [1/rad] and phase [rad] of what its magnets add.
+        pub cogging: [R; 3],
     }
 }
 
@@ -161,6 +180,8 @@ pub enum ActivationRate<R> {
     Filter(R),
     /// As that of a muscle.
     Muscle(MuscleRate<R>),
+    /// As the current of a DC motor, over this time constant [s].
+    Current(R),
 }
 
 recast! {
@@ -235,6 +256,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for ActivationRate<R> {
             ActivationRate::Control => ActivationRate::Control,
             ActivationRate::Filter(time) => ActivationRate::Filter(time.recast()),
             ActivationRate::Muscle(rate) => ActivationRate::Muscle(rate.recast()),
+            ActivationRate::Current(time) => ActivationRate::Current(time.recast()),
         }
     }
 }

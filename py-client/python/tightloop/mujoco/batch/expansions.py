@@ -233,7 +233,7 @@ class Expansions:
             field = varied_fields.FIELDS[name]
             return field.wrong(self._model, values), field.problem
         if name in gains.PARAMS:
-            problem = "of a muscle, or with velocity of an adhesion, cannot differ"
+            problem = "of a muscle or a DC motor, or with velocity of an adhesion, cannot differ"
             return gains.inexpressible(self._model, name, values), problem
         if name not in _SAME or name == "gravity":
             return np.zeros(values.shape, bool), ""

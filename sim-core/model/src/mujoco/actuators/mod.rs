@@ -1,5 +1,6 @@
 //! Actuators of a model: their laws and activations.
 
+pub(super) mod motors;
 pub(super) mod muscles;
 mod transmissions;
 
@@ -8,6 +9,7 @@ use super::names::names;
 use super::options::has_flag;
 use crate::description::{Actuator, ActuatorActivation, Robot};
 use crate::error::ModelError;
+use motors::Motors;
 use muscles::{Law, Muscles};
 use sim_physics::constants::actuators::{ActivationRate, MuscleRate};
 use transmissions::Transmissions;
@@ -21,6 +23,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let (gain_kinds, gains) = laws(file, "gain", count)?;
     let (bias_kinds, biases) = laws(file, "bias", count)?;
     let muscles = Muscles::read(file, count)?;
+    let motors = Motors::read(file, count)?;
     let clamps = !has_flag(file, "mjDSBL_CLAMPCTRL")?;
     let ctrl_ranges = ranges(file, "ctrl", count)?;
     let force_ranges = ranges(file, "force", count)?;
@@ -32,23 +35,27 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
         let length = transmissions.length(k)?;
         let is_on = acts && !((0..31).contains(&groups[k]) && disabled >> groups[k] & 1 == 1);
         let on = |law: [f64; 3]| if is_on { law } else { [0.0; 3] };
+        let motor_laws = motors.laws(k);
         actuators.push(Actuator {
             name: names[k].clone(),
             length,
             activation: activations.activation(k, is_on, acts),
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
             force_range: force_ranges[k].filter(|_| is_on),
-            gain: on(match gain_kinds[k].as_str() {
-                "mjGAIN_AFFINE" => gains[k],
-                "mjGAIN_MUSCLE" => [0.0; 3],
+            gain: on(match (motor_laws, gain_kinds[k].as_str()) {
+                (Some([gain, _]), _) => gain,
+                (_, "mjGAIN_AFFINE") => gains[k],
+                (_, "mjGAIN_MUSCLE") => [0.0; 3],
                 _ => [gains[k][0], 0.0, 0.0],
             }),
-            bias: on(match bias_kinds[k].as_str() {
-                "mjBIAS_AFFINE" => biases[k],
+            bias: on(match (motor_laws, bias_kinds[k].as_str()) {
+                (Some([_, bias]), _) => bias,
+                (_, "mjBIAS_AFFINE") => biases[k],
                 _ => [0.0; 3],
             }),
             muscle_gain: muscles.law(k, gain_kinds[k] == "mjGAIN_MUSCLE" && is_on, Law::Gain),
             muscle_bias: muscles.law(k, bias_kinds[k] == "mjBIAS_MUSCLE" && is_on, Law::Bias),
+            motor: motors.motor(k).filter(|_| is_on),
         });
     }
     if let Some(parts) = &mut robot.precompiled {
@@ -103,7 +110,10 @@ impl Activations {
             if *count > 0 && first != next {
                 return Err(file.fault("has activations in another order".to_owned()));
             }
-            if *count != i64::from(kind != "mjDYN_NONE") {
+            // a motor has one if it has inductance
+            let most = i64::from(kind != "mjDYN_NONE");
+            let is_motor = kind == "mjDYN_DCMOTOR";
+            if *count > most || (*count < most && !is_motor) {
                 return Err(file.fault(format!("has {count} activations of kind {kind}")));
             }
             next += count;
@@ -121,6 +131,7 @@ impl Activations {
         let time = self.parameters[k][0].max(TIME_MIN);
         let rate = match self.kinds[k].as_str() {
             "mjDYN_NONE" => return None,
+            "mjDYN_DCMOTOR" => ActivationRate::Current(self.current_time(k)?),
             "mjDYN_INTEGRATOR" => ActivationRate::Control,
             "mjDYN_MUSCLE" => {
                 let [rise, fall, width, ..] = self.parameters[k];

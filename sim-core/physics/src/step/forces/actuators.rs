@@ -7,11 +7,11 @@
 //! smooth += clamp(Σ c force)                                            over the actuators of a dof
 //! ```
 //!
-//! Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps the sum in its range, before it is
-//! clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
+//! DC motors have more ([`super::motors`]). Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps
+//! the sum in its range, before it is clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
 
-use super::muscles;
 use super::transmission::measure;
+use super::{motors, muscles};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::actuators::{Activation, ActivationRate};
@@ -59,7 +59,7 @@ impl Stage for Actuators {
         // ȧ first, since the force of an `early` actuator is that of the next activation
         for (k, actuator) in m.actuators.all.iter().enumerate() {
             if let Some(activation) = &actuator.activation {
-                b.work.act_dot[activation.place] = rate(cx, b, actuator, activation, k);
+                b.work.act_dot[activation.place] = rate(cx, m, b, activation, k);
             }
         }
         // the scale of a tendon's actuators is in the place of their forces until these are known
@@ -80,6 +80,11 @@ impl Stage for Actuators {
             }
             let force = match force_range(m, &b.params, k) {
                 Some([least, most]) => force.max(least).min(most),
+                None => force,
+            };
+            // what magnets of a motor add is not clamped
+            let force = match &actuator.motor {
+                Some(motor) => motors::with_cogging(motor, force, b.work.actuator_length[k]),
                 None => force,
             };
             b.work.actuator_force[k] = force;
@@ -154,11 +159,12 @@ fn control<F: Num, V>(b: &crate::arrays::Block<F, V>, actuator: &Actuator<F::Rea
 #[inline(always)]
 fn rate<C: Cx>(
     cx: &mut C,
-    b: &BlockOf<C>,
-    actuator: &Actuator<<C::F as Num>::Real>,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
     activation: &Activation<<C::F as Num>::Real>,
     k: usize,
 ) -> C::F {
+    let actuator = &m.actuators.all[k];
     match activation.rate {
         ActivationRate::Held => C::F::c(0.0),
         ActivationRate::Control => control(b, actuator, k),
@@ -170,6 +176,13 @@ fn rate<C: Cx>(
         ActivationRate::Muscle(ref rate) => {
             let act = cx.get(&b.act[activation.place]);
             muscles::rate(rate, control(b, actuator, k), act)
+        }
+        ActivationRate::Current(time) => {
+            let input = control(b, actuator, k);
+            let torque = direct_force(cx, m, b, k, input);
+            let current = cx.get(&b.act[activation.place]);
+            let motor = actuator.motor.as_ref().expect("motors have currents");
+            motors::current_rate(motor, time, torque, current)
         }
     }
 }
@@ -203,6 +216,25 @@ pub(super) fn input<C: Cx>(
 #[inline(always)]
 fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, input: C::F) -> C::F {
     let actuator = &m.actuators.all[k];
+    if let (Some(activation), Some(motor)) = (&actuator.activation, &actuator.motor)
+        && let ActivationRate::Current(_) = activation.rate
+    {
+        // gain and bias made the current, for which length and velocity were written
+        return motors::torque(motor, input);
+    }
+    direct_force(cx, m, b, k, input)
+}
+
+/// The same of an actuator whose force is what gain and bias make of its input.
+#[inline(always)]
+fn direct_force<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    k: usize,
+    input: C::F,
+) -> C::F {
+    let actuator = &m.actuators.all[k];
     let (mut length, mut velocity) = (C::F::c(0.0), C::F::c(0.0));
     // l and v = Σ moment q̇ of a length whose moments change
     if let Some(turning) = &actuator.turning {
@@ -233,7 +265,11 @@ fn force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>, k: usize, in
         Some(muscle) => muscles::bias(muscle, length),
         None => law(m, params, Param::ActuatorBias, (k, bias), state),
     };
-    gain.fma(input, bias)
+    let force = gain.fma(input, bias);
+    match &actuator.motor {
+        Some(motor) => motors::within_voltage(motor, force, velocity),
+        None => force,
+    }
 }
 
 /// A gain or bias of an actuator: constant, per length, per velocity.

@@ -7,7 +7,7 @@
 //! As in MuJoCo, dofs of different branches of a tree do not damp each other.
 
 use super::actuators::{force_range, input};
-use super::{curves, muscles};
+use super::{curves, motors, muscles};
 use crate::arrays::Workspace;
 use crate::constants::lengths::Term;
 use crate::constants::params::Param;
@@ -41,6 +41,10 @@ pub(in crate::step) fn add_damping<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mu
         };
         let slope = gain.fma(input, bias);
         let mut damping = -(slope * dt);
+        // a current does not follow at once
+        if let Some(share) = motors::share_in_a_step(actuator.activation.as_ref()) {
+            damping = damping * C::F::c(share);
+        }
         // a force at its bound does not change with the velocity: no damping in that world
         if let Some([least, most]) = force_range(m, &b.params, k) {
             let force = b.work.actuator_force[k];

@@ -7,6 +7,7 @@
 //! | `actuators`, `transmission` | actuators: activation, gain, bias, and the lengths along which they act |
 //! | `adhesion` | actuators that pull bodies to what they touch |
 //! | `damping` | damping of actuators and tendons in an implicit step |
+//! | `motors` | DC motors: voltage, current, cogging |
 //! | `muscles` | gain, bias and activation of muscles |
 //! | `springs` | springs and dampers of joints and tendons |
 //! | `curves` | their stiffness and damping where these are polynomials |
@@ -24,6 +25,7 @@ pub mod ellipsoid_fluid;
 pub mod fluid;
 pub mod gravity_compensation;
 pub mod link_forces;
+mod motors;
 mod muscles;
 pub mod springs;
 pub mod transmission;
