@@ -59,7 +59,8 @@ _ARRAYS = """
     pair_solreffriction pair_solimp pair_margin pair_gap pair_friction
     actuator_lengthrange actuator_acc0 actuator_cranklength
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
-    cam_bodyid cam_pos cam_quat geom_group geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
+    cam_bodyid cam_pos cam_quat cam_targetbodyid cam_pos0 cam_poscom0 cam_mat0 cam_fovy cam_resolution cam_sensorsize
+    cam_intrinsic geom_group geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
     sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.

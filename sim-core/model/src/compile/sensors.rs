@@ -4,12 +4,13 @@ use super::bodies::BodyBuilder;
 use super::carrier::Carrier;
 use super::output_frames::mounted_on;
 use super::tendons::Lengths;
-use crate::description::{Robot, Sense, SensorParts, ZonePart};
+use crate::description::{AimPart, EyePart, OnLink, Robot, Sense, SensorParts, ZonePart};
 use crate::model::SensorInfo;
+use crate::pose::Pose;
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::sensors::{
-    AccelerationSensor, ContactSensor, Cutoff, FrameSensor, RayGeom, Sensor, SensorKind, Sensors,
-    TouchSensor, WrenchSensor, Zone,
+    AccelerationSensor, Aim, AimedSensor, ContactSensor, Cutoff, Eye, FrameSensor, Place,
+    ProjectionSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor, WrenchSensor, Zone,
 };
 use sim_physics::constants::site::Mount;
 use sim_physics::constants::{Dof, Tree};
@@ -195,6 +196,23 @@ impl Scope<'_> {
                 let geoms = geoms.iter().map(|geom| self.first_ray_geom + geom);
                 SensorKind::Range(mount(site), geoms.collect())
             }
+            Sense::Aimed { part, of, from } => SensorKind::Aimed(AimedSensor {
+                part: *part,
+                of: self.eye(of),
+                from: from.as_ref().map(|from| self.eye(from)),
+            }),
+            Sense::Projection {
+                camera,
+                site,
+                focal,
+                middle,
+            } => SensorKind::Projection(ProjectionSensor {
+                camera: self.eye(camera),
+                site: mount(site),
+                focal: *focal,
+                middle: *middle,
+            }),
+            Sense::Inside(zone, eye) => SensorKind::Inside(self.zone(zone), self.eye(eye)),
             Sense::PotentialEnergy => SensorKind::PotentialEnergy([0.0; 3]),
             Sense::KineticEnergy => SensorKind::KineticEnergy,
             Sense::Clock => SensorKind::Clock,
@@ -206,6 +224,38 @@ impl Scope<'_> {
             site: mounted_on(self.carriers, &zone.site),
             kind: zone.kind,
             size: zone.size,
+        }
+    }
+
+    fn eye(&self, eye: &EyePart) -> Eye<f64> {
+        let place = |link: usize, is_center| match is_center {
+            true => Place::Center(self.first_body + link),
+            false => {
+                let on = OnLink {
+                    link,
+                    pose: Pose::identity(),
+                    is_inertial: false,
+                };
+                Place::Origin(mounted_on(self.carriers, &on))
+            }
+        };
+        Eye {
+            mount: mounted_on(self.carriers, &eye.on),
+            aim: match eye.aim {
+                AimPart::Fixed => Aim::Fixed,
+                AimPart::LooksAt { link, is_center } => Aim::LooksAt(place(link, is_center)),
+                AimPart::Follows {
+                    is_center,
+                    offset,
+                    axes,
+                } => {
+                    // link 0 is the model's world, which the scene may turn
+                    let world = &self.carriers[0].pose;
+                    let column = |k: usize| world.rotate(axes.map(|row| row[k]));
+                    let followed = place(eye.on.link, is_center);
+                    Aim::Follows(followed, world.rotate(offset), [0, 1, 2].map(column))
+                }
+            },
         }
     }
 

@@ -112,6 +112,28 @@ pub enum Sense {
     },
     /// Distance from a site along its z axis to the nearest of some of [`SensorParts::geoms`].
     Range(OnLink, Vec<usize>),
+    /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
+    Aimed {
+        /// Which; not the orientation.
+        part: FramePart,
+        /// The frame.
+        of: EyePart,
+        /// The frame that it is seen from.
+        from: Option<EyePart>,
+    },
+    /// The pixel of a site in the picture of a camera.
+    Projection {
+        /// The camera.
+        camera: EyePart,
+        /// The site.
+        site: OnLink,
+        /// Focal lengths along x and y [pixels].
+        focal: [f64; 2],
+        /// Middle of the picture [pixels].
+        middle: [f64; 2],
+    },
+    /// Whether the origin of a frame is in a zone.
+    Inside(ZonePart, EyePart),
     /// Potential energy.
     PotentialEnergy,
     /// Kinetic energy.
@@ -130,6 +152,8 @@ impl Sense {
             | Sense::Subtree(..)
             | Sense::Wrench { .. } => 3,
             Sense::Ball { is_rate, .. } => 4 - usize::from(*is_rate),
+            Sense::Aimed { .. } => 3,
+            Sense::Projection { .. } => 2,
             Sense::Frame { part, .. } => 3 + usize::from(*part == FramePart::Quat),
             Sense::Contact { records, shows, .. } => {
                 let shown = OF_PARTS.iter().zip(shows).filter(|(_, shown)| **shown);
@@ -144,6 +168,7 @@ impl Sense {
             | Sense::ConstraintLimit(..)
             | Sense::Touch(_)
             | Sense::Range(..)
+            | Sense::Inside(..)
             | Sense::PotentialEnergy
             | Sense::KineticEnergy
             | Sense::Clock => 1,
@@ -160,6 +185,38 @@ pub struct ZonePart {
     pub kind: ZoneKind,
     /// As MuJoCo's `site_size` [m].
     pub size: [f64; 3],
+}
+
+/// A frame that may be that of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EyePart {
+    /// The frame where nothing aims it.
+    pub on: OnLink,
+    /// What it follows or looks at.
+    pub aim: AimPart,
+}
+
+/// What a camera follows or looks at: a link, or the centre of mass of it with all links below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AimPart {
+    /// Nothing.
+    Fixed,
+    /// It keeps a vector from its link [m] and its axes, both in the model's world.
+    Follows {
+        /// Is it the centre of mass?
+        is_center: bool,
+        /// The vector [m].
+        offset: [f64; 3],
+        /// The axes, as rows of the matrix whose columns they are [–].
+        axes: [[f64; 3]; 3],
+    },
+    /// It looks at a link.
+    LooksAt {
+        /// The link.
+        link: usize,
+        /// Is it the centre of mass?
+        is_center: bool,
+    },
 }
 
 /// A geom that rangefinders see.

@@ -1,8 +1,9 @@
 //! Sensors of models from MuJoCo.
 
 use sim_physics::constants::sensors::{
-    AccelerationSensor, ContactSensor, Cutoff, FramePart, FrameSensor, LimitPart, RayGeom,
-    Reduction, Sensor, SensorKind, Sensors, SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
+    AccelerationSensor, Aim, AimedSensor, ContactSensor, Cutoff, Eye, FramePart, FrameSensor,
+    LimitPart, Place, ProjectionSensor, RayGeom, Reduction, Sensor, SensorKind, Sensors,
+    SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
 };
 
 use super::text::{Text, View, view, words};
@@ -25,6 +26,12 @@ view! {
         Always { "most": most, "is_two_sided": is_two_sided };
     FrameSensor<f64> as "FrameSensor":
         Always { "part": part, "of": of, "from": from, "is_local": is_local };
+    Eye<f64> as "Eye":
+        Always { "mount": mount, "aim": aim };
+    AimedSensor<f64> as "AimedSensor":
+        Always { "part": part, "of": of, "from": from };
+    ProjectionSensor<f64> as "ProjectionSensor":
+        Always { "camera": camera, "site": site, "focal": focal, "middle": middle };
     AccelerationSensor<f64> as "AccelerationSensor":
         Always { "of": of, "is_angular": is_angular, "is_local": is_local };
     WrenchSensor<f64> as "WrenchSensor":
@@ -85,9 +92,31 @@ impl View for SensorKind<f64> {
             SensorKind::Touch(touch) => text.tuple("Touch", &[touch]),
             SensorKind::Contact(contact) => text.tuple("Contact", &[contact]),
             SensorKind::Range(site, geoms) => text.tuple("Range", &[site, geoms]),
+            SensorKind::Aimed(frame) => text.tuple("Aimed", &[frame]),
+            SensorKind::Projection(projection) => text.tuple("Projection", &[projection]),
+            SensorKind::Inside(zone, eye) => text.tuple("Inside", &[zone, eye]),
             SensorKind::PotentialEnergy(moment) => text.tuple("PotentialEnergy", &[moment]),
             SensorKind::KineticEnergy => text.put("KineticEnergy"),
             SensorKind::Clock => text.put("Clock"),
+        }
+    }
+}
+
+impl View for Aim<f64> {
+    fn write(&self, text: &mut Text) {
+        match self {
+            Aim::Fixed => text.put("Fixed"),
+            Aim::Follows(place, offset, axes) => text.tuple("Follows", &[place, offset, axes]),
+            Aim::LooksAt(place) => text.tuple("LooksAt", &[place]),
+        }
+    }
+}
+
+impl View for Place<f64> {
+    fn write(&self, text: &mut Text) {
+        match self {
+            Place::Origin(mount) => text.tuple("Origin", &[mount]),
+            Place::Center(body) => text.tuple("Center", &[body]),
         }
     }
 }

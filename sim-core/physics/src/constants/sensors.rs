@@ -115,6 +115,12 @@ pub enum SensorKind<R> {
     Contact(ContactSensor<R>),
     /// Distance from a site along its z axis to the nearest of some geoms, or -1 [m].
     Range(Mount<R>, Vec<usize>),
+    /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
+    Aimed(AimedSensor<R>),
+    /// The pixel of a site in the picture of a camera (MuJoCo: `camprojection`).
+    Projection(ProjectionSensor<R>),
+    /// 1 where the origin of a frame is in a zone, else 0 (MuJoCo: `insidesite`).
+    Inside(Zone<R>, Eye<R>),
     /// Potential energy [J]; the first moment of what stands still [kg·m].
     PotentialEnergy([R; 3]),
     /// Kinetic energy [J].
@@ -135,6 +141,65 @@ recast! {
         pub from: Option<Mount<R>>,
         /// Is it given in the axes of the frame itself?
         pub is_local: bool,
+    }
+}
+
+recast! {
+    /// A frame that may be that of a camera.
+    #[derive(Clone, Debug)]
+    pub struct Eye<R> {
+        /// The frame where nothing aims it. It moves with that body in any case, as in MuJoCo.
+        pub mount: Mount<R>,
+        /// What it follows or looks at.
+        pub aim: Aim<R>,
+    }
+}
+
+/// What a camera follows or looks at.
+#[derive(Clone, Debug)]
+pub enum Aim<R> {
+    /// Nothing.
+    Fixed,
+    /// It keeps a vector from a place [m], and its axes by columns [–], both in the world.
+    Follows(Place<R>, [R; 3], [[R; 3]; 3]),
+    /// It looks at a place, its x axis level.
+    LooksAt(Place<R>),
+}
+
+/// A place that a camera follows or looks at.
+#[derive(Clone, Debug)]
+pub enum Place<R> {
+    /// The origin of a frame.
+    Origin(Mount<R>),
+    /// The centre of mass of a body of MuJoCo models with all bodies below it.
+    Center(usize),
+}
+
+recast! {
+    /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
+    #[derive(Clone, Debug)]
+    pub struct AimedSensor<R> {
+        /// Which property. Orientations are those of the mounts, so no sensor of them is here.
+        pub part: FramePart,
+        /// The frame.
+        pub of: Eye<R>,
+        /// The frame that it is seen from, and in whose axes it is given; none for the world.
+        pub from: Option<Eye<R>>,
+    }
+}
+
+recast! {
+    /// The pixel of a site in the picture of a camera.
+    #[derive(Clone, Debug)]
+    pub struct ProjectionSensor<R> {
+        /// The camera, which looks along -z.
+        pub camera: Eye<R>,
+        /// The site.
+        pub site: Mount<R>,
+        /// Focal lengths along x and y [pixels].
+        pub focal: [R; 2],
+        /// Middle of the picture [pixels].
+        pub middle: [R; 2],
     }
 }
 
@@ -299,9 +364,35 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
             Touch(touch) => Touch(touch.recast()),
             Contact(contact) => Contact(contact.recast()),
             Range(site, geoms) => Range(site.recast(), geoms.clone()),
+            Aimed(frame) => Aimed(frame.recast()),
+            Projection(projection) => Projection(projection.recast()),
+            Inside(zone, eye) => Inside(zone.recast(), eye.recast()),
             PotentialEnergy(moment) => PotentialEnergy(moment.recast()),
             KineticEnergy => KineticEnergy,
             Clock => Clock,
+        }
+    }
+}
+
+impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for Aim<R> {
+    type Out = Aim<S>;
+    fn recast(&self) -> Aim<S> {
+        match self {
+            Aim::Fixed => Aim::Fixed,
+            Aim::Follows(place, offset, axes) => {
+                Aim::Follows(place.recast(), offset.recast(), axes.recast())
+            }
+            Aim::LooksAt(place) => Aim::LooksAt(place.recast()),
+        }
+    }
+}
+
+impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for Place<R> {
+    type Out = Place<S>;
+    fn recast(&self) -> Place<S> {
+        match self {
+            Place::Origin(mount) => Place::Origin(mount.recast()),
+            Place::Center(body) => Place::Center(*body),
         }
     }
 }

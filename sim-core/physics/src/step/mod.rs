@@ -118,6 +118,7 @@ macro_rules! every_stage {
             sensor_wrenches      [outputs::sensors::Wrenches]                Evaluation;
             sensor_contacts      [outputs::sensors::Contacts]                Evaluation;
             sensor_rays          [outputs::sensors::Rays]                    Evaluation;
+            sensor_cameras       [outputs::sensors::Cameras]                 Evaluation;
         }
     };
 }

@@ -10,9 +10,9 @@ use crate::mujoco::frames::on_links;
 const SHOWN: u32 = 7;
 
 impl Reader<'_> {
-    /// The zone of a sensor's site.
-    pub(super) fn zone(&self, k: usize) -> Result<ZonePart, ModelError> {
-        let site = self.index(k, self.sites.len())?;
+    /// The zone of the site that a sensor is of (0), or seen from (1).
+    pub(super) fn zone(&self, k: usize, which: usize) -> Result<ZonePart, ModelError> {
+        let site = self.index(k, which, self.sites.len())?;
         Ok(ZonePart {
             site: self.sites[site],
             kind: match self.site_kinds[site].as_str() {
@@ -27,11 +27,11 @@ impl Reader<'_> {
     }
 
     /// Whether a sensor's site is a mesh, which newer versions of MuJoCo have.
-    pub(super) fn is_zone_of_mesh(&self, k: usize) -> Result<bool, ModelError> {
-        if self.objects[0][k] != "mjOBJ_SITE" {
+    pub(super) fn is_zone_of_mesh(&self, k: usize, which: usize) -> Result<bool, ModelError> {
+        if self.objects[which][k] != "mjOBJ_SITE" {
             return Ok(false);
         }
-        let site = self.index(k, self.sites.len())?;
+        let site = self.index(k, which, self.sites.len())?;
         Ok(self.site_kinds[site] == "mjGEOM_MESH")
     }
 
@@ -47,7 +47,7 @@ impl Reader<'_> {
         let first = self.touching(k, 0)?;
         Ok(Ok(Sense::Contact {
             zone: match first {
-                Touching::InZone => Some(self.zone(k)?),
+                Touching::InZone => Some(self.zone(k, 0)?),
                 _ => None,
             },
             first,

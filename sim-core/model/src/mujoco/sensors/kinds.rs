@@ -1,7 +1,7 @@
 //! What sensors measure, by their types.
 
 use super::{Reader, Sensed};
-use crate::description::{FramePart, Length, LimitPart, OnLink, Sense, SubtreePart};
+use crate::description::{AimPart, FramePart, Length, LimitPart, OnLink, Sense, SubtreePart};
 use crate::error::ModelError;
 use crate::mujoco::options::has_flag;
 use crate::pose::Pose;
@@ -53,12 +53,16 @@ impl Reader<'_> {
                 from: None,
                 is_local: true,
             },
-            "TOUCH" | "CONTACT" if self.is_zone_of_mesh(k)? => {
+            "TOUCH" | "CONTACT" | "INSIDESITE"
+                if self.is_zone_of_mesh(k, usize::from(kind == "INSIDESITE"))? =>
+            {
                 return Ok(Err("sites of meshes".to_owned()));
             }
-            "TOUCH" => Sense::Touch(self.zone(k)?),
+            "TOUCH" => Sense::Touch(self.zone(k, 0)?),
             "CONTACT" => return self.contact(k),
             "RANGEFINDER" => return self.range(k),
+            "CAMPROJECTION" => return self.projection(k),
+            "INSIDESITE" => return self.inside(k),
             "ACCELEROMETER" => {
                 let of = self.site(k)?;
                 match self.constant_acceleration(&of)? {
@@ -73,7 +77,7 @@ impl Reader<'_> {
             _ => match (limit_part(kind), subtree_part(kind)) {
                 (Some((part, false)), _) => self.joint_limit(k, part)?,
                 (Some((part, true)), _) => self.tendon_limit(k, part)?,
-                (_, Some(part)) => Sense::Subtree(self.index(k, self.robot.links.len())?, part),
+                (_, Some(part)) => Sense::Subtree(self.index(k, 0, self.robot.links.len())?, part),
                 _ => return self.frame_sense(k, kind),
             },
         };
@@ -112,11 +116,16 @@ impl Reader<'_> {
             "FRAMELINACC" | "FRAMEANGACC" => None,
             other => return Ok(Err(other.to_lowercase())),
         };
-        let of = match self.object(k, 0)? {
-            Ok(of) => of,
+        let eye = match self.eye(k, 0)? {
+            Ok(eye) => eye,
             Err(what) => return Ok(Err(what)),
         };
+        let of = eye.on;
         let Some(part) = part else {
+            // only the place of a camera enters, which is its own unless it follows something
+            if kind == "FRAMELINACC" && matches!(eye.aim, AimPart::Follows { .. }) {
+                return Ok(Err("accelerations of cameras that track".to_owned()));
+            }
             if kind == "FRAMELINACC"
                 && let Some(vector) = self.constant_acceleration(&of)?
             {
@@ -133,13 +142,23 @@ impl Reader<'_> {
                 is_local: false,
             }));
         };
-        let from = match self.ids[1][k] >= 0 {
-            true => match self.object(k, 1)? {
+        let seen_from = match self.ids[1][k] >= 0 {
+            true => match self.eye(k, 1)? {
                 Ok(from) => Some(from),
                 Err(what) => return Ok(Err(what)),
             },
             false => None,
         };
+        let from = seen_from.map(|from| from.on);
+        // MuJoCo shows the orientation of a camera as if nothing aimed it
+        let mut eyes = seen_from.iter().chain([&eye]);
+        if part != FramePart::Quat && eyes.any(|eye| eye.aim != AimPart::Fixed) {
+            return Ok(Ok(Sense::Aimed {
+                part,
+                of: eye,
+                from: seen_from,
+            }));
+        }
         Ok(Ok(Sense::Frame {
             part,
             of,

@@ -1,5 +1,6 @@
 //! Sensors of a model. Those that are not supported are named; a model runs without them.
 
+mod cameras;
 mod contacts;
 mod kinds;
 mod objects;
@@ -14,6 +15,7 @@ use super::tendons::{Tendons, moving};
 use crate::description::{OnLink, RayPart, Robot, Sense, Sensor, SensorParts};
 use crate::error::ModelError;
 use crate::pose::Pose;
+use cameras::Cameras;
 
 /// Adds the sensors. `robot` has its joints, constraints and actuators.
 ///
@@ -106,8 +108,7 @@ struct Reader<'a> {
     rays: Vec<Option<RayPart>>,
     site_kinds: Vec<String>,
     site_sizes: Vec<[f64; 3]>,
-    cameras: Vec<OnLink>,
-    camera_modes: Vec<String>,
+    cameras: Cameras,
 }
 
 /// What a sensor measures, or what is not supported.
@@ -119,7 +120,6 @@ impl<'a> Reader<'a> {
         let centers = file.vectors::<3>("body_ipos", bodies)?;
         let turns = file.vectors::<4>("body_iquat", bodies)?;
         let inertial = centers.into_iter().zip(turns);
-        let cameras = file.rows("cam_bodyid");
         let mut late = vec![false; count];
         for (array, width) in [("sensor_delay", 1), ("sensor_interval", 2)] {
             if file.has(array) {
@@ -149,8 +149,7 @@ impl<'a> Reader<'a> {
             rays: contacts::rays(file, bodies)?,
             site_kinds: file.kinds("site_type", file.rows("site_bodyid"))?,
             site_sizes: file.vectors("site_size", file.rows("site_bodyid"))?,
-            cameras: on_links(file, "cam", bodies)?,
-            camera_modes: file.kinds("cam_mode", cameras)?,
+            cameras: Cameras::read(file, bodies)?,
             file,
             robot,
         })

@@ -1,17 +1,19 @@
 //! What sensors are about: frames, joints, tendons, actuators and limits.
 
 use super::Reader;
-use crate::description::{ConstraintLaw, Length, LimitPart, Measure, OnLink, Sense};
+use crate::description::{
+    AimPart, ConstraintLaw, EyePart, Length, LimitPart, Measure, OnLink, Sense,
+};
 use crate::error::ModelError;
 use crate::pose::Pose;
 
 impl Reader<'_> {
     /// The frame of a sensor (0), or that it is seen from (1).
-    pub(super) fn object(
+    pub(super) fn eye(
         &self,
         k: usize,
         which: usize,
-    ) -> Result<Result<OnLink, String>, ModelError> {
+    ) -> Result<Result<EyePart, String>, ModelError> {
         let id = self.ids[which][k];
         let place = |frames: &[OnLink]| {
             let frame = usize::try_from(id).ok().and_then(|id| frames.get(id));
@@ -31,19 +33,20 @@ impl Reader<'_> {
                 is_inertial,
             })
         };
-        Ok(Ok(match self.objects[which][k].as_str() {
+        let on = match self.objects[which][k].as_str() {
             "mjOBJ_BODY" => body(true)?,
             "mjOBJ_XBODY" => body(false)?,
             "mjOBJ_GEOM" => place(&self.geoms)?,
             "mjOBJ_SITE" => place(&self.sites)?,
             "mjOBJ_CAMERA" => {
-                let camera = place(&self.cameras)?;
-                if self.camera_modes[id as usize] != "mjCAMLIGHT_FIXED" {
-                    return Ok(Err("cameras that track or target".to_owned()));
-                }
-                camera
+                place(&self.cameras.places)?;
+                return self.cameras.eye(self.file, id as usize);
             }
             other => return Ok(Err(other.to_owned())),
+        };
+        Ok(Ok(EyePart {
+            on,
+            aim: AimPart::Fixed,
         }))
     }
 
@@ -51,19 +54,19 @@ impl Reader<'_> {
         self.file.fault(format!("has no object for sensor {k}"))
     }
 
-    /// The object of a sensor as an index below `end`.
-    pub(super) fn index(&self, k: usize, end: usize) -> Result<usize, ModelError> {
-        let id = usize::try_from(self.ids[0][k]).ok();
+    /// The object of a sensor (0), or its reference (1), as an index below `end`.
+    pub(super) fn index(&self, k: usize, which: usize, end: usize) -> Result<usize, ModelError> {
+        let id = usize::try_from(self.ids[which][k]).ok();
         id.filter(|&id| id < end).ok_or_else(|| self.fault(k))
     }
 
     pub(super) fn site(&self, k: usize) -> Result<OnLink, ModelError> {
-        Ok(self.sites[self.index(k, self.sites.len())?])
+        Ok(self.sites[self.index(k, 0, self.sites.len())?])
     }
 
     /// A joint among the robot's.
     pub(super) fn joint(&self, k: usize) -> Result<usize, ModelError> {
-        Ok(self.joints[self.index(k, self.joints.len())?])
+        Ok(self.joints[self.index(k, 0, self.joints.len())?])
     }
 
     pub(super) fn scalar_joint(&self, k: usize) -> Result<usize, ModelError> {
@@ -75,7 +78,7 @@ impl Reader<'_> {
     }
 
     pub(super) fn actuator(&self, k: usize) -> Result<usize, ModelError> {
-        self.index(k, self.file.rows("actuator_trntype"))
+        self.index(k, 0, self.file.rows("actuator_trntype"))
     }
 
     /// The length of a tendon.

@@ -3,12 +3,14 @@
 //! Each stage evaluates the sensors that need the same arrays, so a model without force sensors needs no accelerations.
 //! A cutoff bounds what a sensor shows.
 
+mod cameras;
 pub mod contacts;
 mod forces;
 mod rays;
 mod states;
 mod zone;
 
+pub use cameras::Cameras;
 pub use contacts::Contacts;
 pub use forces::{Accelerations, Energies, Forces, Wrenches};
 pub use rays::Rays;
