@@ -253,12 +253,6 @@ REFUSED = {
         "sensor `t`: no support for sites of meshes",
         is_sensor=True,
     ),
-    "velocities of contacts": Refused(
-        (3, 17),
-        _FALL.format("") + '<sensor><contact name="c" geom1="g" data="found linvel"/></sensor>',
-        "sensor `c`: no support for velocities of contacts",
-        is_sensor=True,
-    ),
     "plastic joint": Refused(
         (4, 0), _SPRING.format('stiffness="20" springyield="2"'), "joint `j`: no support for plastic springs"
     ),

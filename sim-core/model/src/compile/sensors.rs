@@ -9,8 +9,8 @@ use crate::model::SensorInfo;
 use crate::pose::Pose;
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::sensors::{
-    AccelerationSensor, Aim, AimedSensor, ContactSensor, Cutoff, Eye, FrameSensor, Place,
-    ProjectionSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor, WrenchSensor, Zone,
+    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FrameSensor,
+    Place, ProjectionSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor, WrenchSensor, Zone,
 };
 use sim_physics::constants::site::Mount;
 use sim_physics::constants::{Dof, Tree};
@@ -182,6 +182,7 @@ impl Scope<'_> {
                 reduction,
                 records,
                 shows,
+                rates,
                 ..
             } => SensorKind::Contact(ContactSensor {
                 zone: zone.as_ref().map(|zone| self.zone(zone)),
@@ -191,6 +192,11 @@ impl Scope<'_> {
                 records: *records,
                 shows: *shows,
                 capsules: Vec::new(),
+                rates: rates.contains(&true).then(|| ContactRates {
+                    shows: *rates,
+                    column: 0,
+                    bodies: Vec::new(),
+                }),
             }),
             Sense::Range(site, geoms) => {
                 let geoms = geoms.iter().map(|geom| self.first_ray_geom + geom);

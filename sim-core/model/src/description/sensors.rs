@@ -109,6 +109,8 @@ pub enum Sense {
         records: usize,
         /// What it shows of a contact: count, force, torque, distance, position, normal, tangent.
         shows: [bool; 7],
+        /// Does it show linear, and angular velocity of the second object as seen from the first?
+        rates: [bool; 2],
     },
     /// Distance from a site along its z axis to the nearest of some of [`SensorParts::geoms`].
     Range(OnLink, Vec<usize>),
@@ -155,10 +157,16 @@ impl Sense {
             Sense::Aimed { .. } => 3,
             Sense::Projection { .. } => 2,
             Sense::Frame { part, .. } => 3 + usize::from(*part == FramePart::Quat),
-            Sense::Contact { records, shows, .. } => {
+            Sense::Contact {
+                records,
+                shows,
+                rates,
+                ..
+            } => {
                 let shown = OF_PARTS.iter().zip(shows).filter(|(_, shown)| **shown);
                 let of_each: usize = shown.map(|(size, _)| size).sum();
-                records.saturating_mul(of_each)
+                let velocities = 3 * rates.iter().filter(|shown| **shown).count();
+                records.saturating_mul(of_each + velocities)
             }
             Sense::Length { .. }
             | Sense::Actuator { .. }

@@ -1,9 +1,9 @@
 //! Sensors of models from MuJoCo.
 
 use sim_physics::constants::sensors::{
-    AccelerationSensor, Aim, AimedSensor, ContactSensor, Cutoff, Eye, FramePart, FrameSensor,
-    LimitPart, Place, ProjectionSensor, RayGeom, Reduction, Sensor, SensorKind, Sensors,
-    SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
+    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FramePart,
+    FrameSensor, LimitPart, Place, ProjectionSensor, RayGeom, Reduction, Sensor, SensorKind,
+    Sensors, SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
 };
 
 use super::text::{Text, View, view, words};
@@ -47,7 +47,10 @@ view! {
             "records": records,
             "shows": shows,
             "capsules": capsules,
-        };
+        }
+        Later { "rates": rates };
+    ContactRates as "ContactRates":
+        Always { "shows": shows, "column": column, "bodies": bodies };
     Zone<f64> as "Zone":
         Always { "site": site, "kind": kind, "size": size };
 }

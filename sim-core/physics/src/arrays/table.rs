@@ -92,7 +92,7 @@ arrays! { m;
         // 1 where the solver has not ended, at the first dof of an island
         busy: Busy [m.island_dofs()] Scratch "–";
         // contacts that a sensor shows
-        contact_records: ContactRecords [17 * m.sensors.records] Scratch "–";
+        contact_records: ContactRecords [m.sensors.record_scalars()] Scratch "–";
         // torque, then force, of the contacts of each body of MuJoCo models
         contact_wrench: ContactWrench [6 * m.outputs.bodies.len()] Scratch "N·m, N";
         // sum of the normal rows of the contacts of a body that an actuator pulls to them

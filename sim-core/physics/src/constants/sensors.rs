@@ -5,6 +5,13 @@ use super::recast::{Recast, recast, same};
 use super::site::Mount;
 use crate::lane::{Fixed, Real};
 
+/// Scalars of a record of a contact: force, torque, distance, position, normal, tangent.
+pub const RECORD: usize = 16;
+/// A record and what it is sorted by.
+pub const SLOT: usize = RECORD + 1;
+/// The same with linear and angular velocity.
+pub const LONG_SLOT: usize = SLOT + 6;
+
 recast! {
     /// Sensors of MuJoCo models in MuJoCo's order, model after model; none for other models.
     #[derive(Clone, Debug)]
@@ -73,6 +80,18 @@ recast! {
         pub most: R,
         /// Is its negative the lower bound?
         pub is_two_sided: bool,
+    }
+}
+
+impl<R> Sensors<R> {
+    /// Scalars of the records of a sensor of contacts, as it keeps them.
+    pub fn record_scalars(&self) -> usize {
+        let has_rates = |kind: &SensorKind<R>| match kind {
+            SensorKind::Contact(contact) => contact.rates.is_some(),
+            _ => false,
+        };
+        let is_long = self.all.iter().any(|sensor| has_rates(&sensor.kind));
+        self.records * if is_long { LONG_SLOT } else { SLOT }
     }
 }
 
@@ -260,7 +279,20 @@ recast! {
         pub shows: [bool; 7],
         /// Its pairs of a plane and a capsule, each with the capsule among the solids: their first tangent is along it.
         pub capsules: Vec<(usize, usize)>,
+        /// How fast its second object moves from the first, if it shows that.
+        pub rates: Option<ContactRates>,
     }
+}
+
+/// Velocities that a sensor of contacts shows (MuJoCo: `linvel`, `angvel`).
+#[derive(Clone, Debug)]
+pub struct ContactRates {
+    /// Which: linear [m/s], angular [rad/s].
+    pub shows: [bool; 2],
+    /// Columns of the table of pairs with the moving bodies of both shapes, from 1; 0 for none.
+    pub column: usize,
+    /// Moving bodies that its contacts are of.
+    pub bodies: Vec<usize>,
 }
 
 recast! {
@@ -397,4 +429,4 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for Place<R> {
     }
 }
 
-same! { FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }
+same! { ContactRates, FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }

@@ -136,6 +136,7 @@ pub(in crate::compile) fn add_contact_sensors(
             columns.push(senses);
         }
     }
+    add_rates(&mut constants.sensors, &constants.contacts, &mut columns);
     // the first column alone is of no sensor
     if columns.len() > 1 {
         let table = Fixed {
@@ -157,6 +158,40 @@ pub(in crate::compile) fn add_contact_sensors(
             rows: ranks.len(),
         };
         constants.contacts.tables.numbers.extend(ranks);
+    }
+}
+
+/// Gives sensors that show velocities the moving bodies of their pairs, and the table of pairs two
+/// columns with those of each.
+fn add_rates(sensors: &mut Sensors<f64>, contacts: &Contacts<f64>, columns: &mut Vec<Vec<f64>>) {
+    let body_of = |shape: usize| {
+        let solid = contacts.solids.iter().find(|solid| solid.shape == shape);
+        solid.and_then(|solid| solid.body)
+    };
+    let first = columns.len();
+    let mut is_shown = false;
+    for sensor in &mut sensors.all {
+        let SensorKind::Contact(contact) = &mut sensor.kind else {
+            continue;
+        };
+        let Some(rates) = &mut contact.rates else {
+            continue;
+        };
+        let senses = contacts.pairs.iter().zip(&columns[contact.column]);
+        let sensed = senses.filter(|(_, sense)| **sense != 0.0);
+        let bodies: BTreeSet<usize> = sensed
+            .flat_map(|(pair, _)| pair.shapes.map(body_of))
+            .flatten()
+            .collect();
+        (rates.column, rates.bodies) = (first, bodies.into_iter().collect());
+        is_shown = true;
+    }
+    if is_shown {
+        for side in 0..2 {
+            let pairs = contacts.pairs.iter();
+            let numbers = pairs.map(|pair| body_of(pair.shapes[side]).map_or(0, |body| body + 1));
+            columns.push(numbers.map(|number| number as f64).collect());
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use crate::error::ModelError;
 use crate::mujoco::format::ModelFile;
 use crate::mujoco::frames::on_links;
 
-/// Parts of a contact that a sensor shows.
-const SHOWN: u32 = 7;
+/// Parts of a contact that a sensor shows besides velocities, and all parts.
+const SHOWN: [u32; 2] = [7, 9];
 
 impl Reader<'_> {
     /// The zone of the site that a sensor is of (0), or seen from (1).
@@ -40,9 +40,9 @@ impl Reader<'_> {
         let count = self.kinds.len();
         let [shows, reduction, records] =
             self.file.vectors_of_integers::<3>("sensor_intprm", count)?[k];
-        // newer versions of MuJoCo show velocities, too
-        if shows >> SHOWN != 0 {
-            return Ok(Err("velocities of contacts".to_owned()));
+        // velocities, which newer versions of MuJoCo have, are the last known parts
+        if shows >> SHOWN[1] != 0 {
+            return Ok(Err("other data of contacts".to_owned()));
         }
         let first = self.touching(k, 0)?;
         Ok(Ok(Sense::Contact {
@@ -60,6 +60,7 @@ impl Reader<'_> {
             },
             records: usize::try_from(records).unwrap_or(1),
             shows: std::array::from_fn(|part| shows >> part & 1 == 1),
+            rates: std::array::from_fn(|part| shows >> (SHOWN[0] + part as u32) & 1 == 1),
         }))
     }
 

@@ -66,7 +66,9 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
             )));
         }
         let is_two_sided = datatypes[k] == "mjDATATYPE_REAL";
-        let is_bounded = is_two_sided || datatypes[k] == "mjDATATYPE_POSITIVE";
+        let is_real = is_two_sided || datatypes[k] == "mjDATATYPE_POSITIVE";
+        // MuJoCo bounds no sensor of contacts
+        let is_bounded = is_real && reader.kinds[k] != "mjSENS_CONTACT";
         parts.all.push(Sensor {
             name,
             place,

@@ -13,12 +13,15 @@
 //!
 //! Tangents are MuJoCo's: with elliptic cones the solver has others, and none without friction.
 
+use super::contact_rates::moving;
 use super::zone::{holds, meets};
 use super::{has, put, put_at};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::contact::{row, turning};
-use crate::constants::sensors::{ContactSensor, Reduction, Sensor, SensorKind, TouchSensor, Zone};
+use crate::constants::sensors::{
+    ContactSensor, LONG_SLOT, RECORD, Reduction, SLOT, Sensor, SensorKind, TouchSensor, Zone,
+};
 use crate::each;
 use crate::lane::{Cx, MaskOf, Num, Real, map};
 use crate::math::vec3::{Mat3, Vec3, load_vec3};
@@ -26,10 +29,6 @@ use crate::step::constraints::contact_rows::{class_list, tangents, turning_scale
 use crate::step::outputs::sites::{position, reference, to_local};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
-/// Scalars of a record: force, torque, distance, position, normal, tangent.
-pub const RECORD: usize = 16;
-/// A record and what it is sorted by.
-pub const SLOT: usize = RECORD + 1;
 /// Key of an empty slot.
 const EMPTY: f64 = 1e30;
 
@@ -41,6 +40,7 @@ impl Stage for Contacts {
         A::Rotation,
         A::Origin,
         A::Reference,
+        A::Velocity,
         A::ContactForces,
         A::Sensordata,
     ];
@@ -70,11 +70,11 @@ impl Stage for Contacts {
 }
 
 /// A contact that a sensor may be of.
-struct Contact<F> {
+pub(super) struct Contact<F> {
     /// In the world [m].
     point: Vec3<F>,
     /// Normal and tangents.
-    frame: Mat3<F>,
+    pub(super) frame: Mat3<F>,
     /// Along them [N].
     force: Vec3<F>,
     /// About them [N·m].
@@ -215,13 +215,20 @@ fn matches<C: Cx>(
     }
 }
 
+/// A vector that changes its sign with the order of the shapes, as MuJoCo shows it.
+#[inline(always)]
+pub(super) fn seen<F: Num>(contact: &Contact<F>, v: Vec3<F>) -> Vec3<F> {
+    // (n · F, s t₁ · F, d t₂ · F) with d = e s, and torques alike
+    let (s, e) = (contact.order, contact.sense);
+    Vec3([v[0], v[1] * s, v[2] * (s * e)])
+}
+
 /// The record of a contact.
 #[inline(always)]
 fn record<F: Num>(contact: &Contact<F>) -> [F; RECORD] {
-    // (n · F, s t₁ · F, d t₂ · F) with d = e s, and torques alike
     let (s, e) = (contact.order, contact.sense);
     let d = s * e;
-    let seen = |v: Vec3<F>| Vec3([v[0], v[1] * s, v[2] * d]);
+    let seen = |v: Vec3<F>| seen(contact, v);
     // place 6, which no part covers, keeps the distance
     let mut all = [contact.distance; RECORD];
     let parts = [
@@ -249,10 +256,14 @@ fn records<C: Cx>(
     let zero = C::F::c(0.0);
     let mut total = cx.var(zero);
     // empty slots: any contact has a smaller key
+    let width = match contact_sensor.rates {
+        Some(_) => LONG_SLOT,
+        None => SLOT,
+    };
     for slot in 0..contact_sensor.records {
-        for k in 0..SLOT {
+        for k in 0..width {
             let start = if k == RECORD { C::F::c(EMPTY) } else { zero };
-            cx.set(&mut b.contact_records[slot * SLOT + k], start);
+            cx.set(&mut b.contact_records[slot * width + k], start);
         }
     }
     for &class in &contact_sensor.classes {
@@ -273,12 +284,18 @@ fn records<C: Cx>(
             let more = cx.get(&total) + C::F::select(is_found, C::F::c(1.0), zero);
             cx.set(&mut total, more);
             // the record and its key; a contact that does not count has the key of an empty slot and stays out
-            let mut carried = [C::F::select(is_found, key, C::F::c(EMPTY)); SLOT];
+            let mut carried = [C::F::select(is_found, key, C::F::c(EMPTY)); LONG_SLOT];
             carried[..RECORD].copy_from_slice(&record(&contact));
+            // velocities follow the key
+            if let Some(rates) = &contact_sensor.rates {
+                let [linear, angular] = moving(cx, m, b, (class, r), rates, &contact);
+                carried[SLOT..SLOT + 3].copy_from_slice(&linear.0);
+                carried[SLOT + 3..].copy_from_slice(&angular.0);
+            }
             // insertion: what a slot loses goes on to the next one
             for slot in 0..contact_sensor.records {
-                let cells = slot * SLOT..(slot + 1) * SLOT;
-                let kept = cx.get(&b.contact_records[slot * SLOT + RECORD]);
+                let cells = slot * width..(slot + 1) * width;
+                let kept = cx.get(&b.contact_records[slot * width + RECORD]);
                 let is_better = carried[RECORD].lt(kept);
                 for (x, cell) in carried.iter_mut().zip(&mut b.contact_records[cells]) {
                     let old = cx.get(cell);
@@ -292,8 +309,13 @@ fn records<C: Cx>(
     // slots beyond the total are 0, count included
     for slot in 0..contact_sensor.records {
         let is_there = C::F::c(slot as f64 + 0.5).lt(total);
-        let kept: [C::F; RECORD] =
-            std::array::from_fn(|k| cx.get(&b.contact_records[slot * SLOT + k]));
+        let mut kept = [zero; LONG_SLOT];
+        for (x, cell) in kept
+            .iter_mut()
+            .zip(&b.contact_records[slot * width..][..width])
+        {
+            *x = cx.get(cell);
+        }
         let shown = map(kept, |x| C::F::select(is_there, x, zero));
         let count = C::F::select(is_there, total, zero);
         show(
@@ -315,15 +337,20 @@ fn show<F: Num>(
     contact_sensor: &ContactSensor<F::Real>,
     slot: usize,
     count: F,
-    record: &[F; RECORD],
+    record: &[F],
 ) {
     // scalars of count, force, torque, distance, position, normal, tangent
     let sizes = [1, 3, 3, 1, 3, 3, 3];
-    let width: usize = sizes
+    let mut width: usize = sizes
         .iter()
         .zip(contact_sensor.shows)
         .map(|(size, shows)| size * usize::from(shows))
         .sum();
+    let rates = contact_sensor
+        .rates
+        .as_ref()
+        .map_or([false; 2], |rates| rates.shows);
+    width += 3 * rates.iter().filter(|shows| **shows).count();
     // the sensor's parts follow each other. The record does not contain the count
     let (mut place, mut first) = (sensor.first + slot * width, 0);
     for (part, (size, shows)) in sizes.into_iter().zip(contact_sensor.shows).enumerate() {
@@ -337,6 +364,14 @@ fn show<F: Num>(
         if shows {
             put_at(data, place, sensor.cutoff.as_ref(), scalars);
             place += size;
+        }
+    }
+    // velocities are behind the key of the record
+    for (part, shows) in rates.into_iter().enumerate() {
+        if shows {
+            let scalars = &record[SLOT + 3 * part..][..3];
+            put_at(data, place, sensor.cutoff.as_ref(), scalars);
+            place += 3;
         }
     }
 }

@@ -4,6 +4,7 @@
 //! A cutoff bounds what a sensor shows.
 
 mod cameras;
+mod contact_rates;
 pub mod contacts;
 mod forces;
 mod rays;
