@@ -18,6 +18,7 @@ mod output_frames;
 mod param_starts;
 mod passive;
 mod precompiled;
+mod ray_meshes;
 mod scans;
 mod sensors;
 mod sites;
@@ -37,6 +38,7 @@ use inverse_weight::Reference;
 use precompiled::{
     check_models, output_site_names, output_tendon_names, sensors_of_centers, take_inverse_weights,
 };
+use ray_meshes::add_ray_meshes;
 use sensors::finish_sensors;
 use sim_physics::constants::actuators::Actuators;
 use sim_physics::constants::contact::Contacts;
@@ -98,6 +100,7 @@ fn compile(scene: &Description) -> Result<Model, ModelError> {
     }
     m.scans = scene.placed_scans(&builder.carriers, &m.contacts)?;
     add_contact_sensors(&mut m, scene, &placed, &rules);
+    add_ray_meshes(&mut m, scene);
     add_params(&mut m, scene, &builder, &placed, &reference)?;
     model(scene, m, builder, reference)
 }

@@ -10,7 +10,8 @@ use crate::pose::Pose;
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::sensors::{
     AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FrameSensor,
-    Place, ProjectionSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor, WrenchSensor, Zone,
+    Place, ProjectionSensor, RangeSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor,
+    WrenchSensor, Zone,
 };
 use sim_physics::constants::site::Mount;
 use sim_physics::constants::{Dof, Tree};
@@ -91,6 +92,7 @@ fn add_sensors(sensors: &mut Sensors<f64>, parts: &SensorParts, scope: &Scope<'_
         at: mounted_on(scope.carriers, &geom.on),
         kind: geom.kind,
         size: geom.size,
+        boxes: None,
     }));
     for sensor in &parts.all {
         let Some(sense) = &sensor.sense else { continue };
@@ -198,9 +200,13 @@ impl Scope<'_> {
                     bodies: Vec::new(),
                 }),
             }),
-            Sense::Range(site, geoms) => {
+            Sense::Range { site, geoms, shows } => {
                 let geoms = geoms.iter().map(|geom| self.first_ray_geom + geom);
-                SensorKind::Range(mount(site), geoms.collect())
+                SensorKind::Range(RangeSensor {
+                    site: mount(site),
+                    geoms: geoms.collect(),
+                    shows: *shows,
+                })
             }
             Sense::Aimed { part, of, from } => SensorKind::Aimed(AimedSensor {
                 part: *part,

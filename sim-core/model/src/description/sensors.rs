@@ -2,6 +2,7 @@
 
 use super::output_frames::OnLink;
 use super::tendons::Length;
+use crate::geometry::TriMesh;
 pub use sim_physics::constants::sensors::{FramePart, LimitPart, Reduction, SubtreePart, ZoneKind};
 
 /// The sensors of a robot, in MuJoCo's order.
@@ -15,6 +16,8 @@ pub struct SensorParts {
     pub scalars: usize,
     /// Geoms that rangefinders see.
     pub geoms: Vec<RayPart>,
+    /// Triangles of some of them.
+    pub meshes: Vec<TriMesh>,
 }
 
 /// A sensor.
@@ -112,8 +115,15 @@ pub enum Sense {
         /// Does it show linear, and angular velocity of the second object as seen from the first?
         rates: [bool; 2],
     },
-    /// Distance from a site along its z axis to the nearest of some of [`SensorParts::geoms`].
-    Range(OnLink, Vec<usize>),
+    /// What a ray from a site along its z axis meets.
+    Range {
+        /// The site.
+        site: OnLink,
+        /// Some of [`SensorParts::geoms`].
+        geoms: Vec<usize>,
+        /// What it shows: distance, direction, origin, point, normal, depth.
+        shows: [bool; 6],
+    },
     /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
     Aimed {
         /// Which; not the orientation.
@@ -148,12 +158,17 @@ impl Sense {
     /// Numbers that it shows.
     pub fn scalars(&self) -> usize {
         const OF_PARTS: [usize; 7] = [1, 3, 3, 1, 3, 3, 3];
+        const OF_RAYS: [usize; 6] = [1, 3, 3, 3, 3, 1];
         match self {
             Sense::Vector(..)
             | Sense::Acceleration { .. }
             | Sense::Subtree(..)
             | Sense::Wrench { .. } => 3,
             Sense::Ball { is_rate, .. } => 4 - usize::from(*is_rate),
+            Sense::Range { shows, .. } => {
+                let shown = OF_RAYS.iter().zip(shows).filter(|(_, shown)| **shown);
+                shown.map(|(size, _)| size).sum()
+            }
             Sense::Aimed { .. } => 3,
             Sense::Projection { .. } => 2,
             Sense::Frame { part, .. } => 3 + usize::from(*part == FramePart::Quat),
@@ -175,7 +190,6 @@ impl Sense {
             | Sense::JointLimit(..)
             | Sense::ConstraintLimit(..)
             | Sense::Touch(_)
-            | Sense::Range(..)
             | Sense::Inside(..)
             | Sense::PotentialEnergy
             | Sense::KineticEnergy
@@ -236,6 +250,8 @@ pub struct RayPart {
     pub kind: Option<ZoneKind>,
     /// As MuJoCo's `geom_size` [m].
     pub size: [f64; 3],
+    /// Its triangles among [`SensorParts::meshes`], if it is made of them.
+    pub mesh: Option<usize>,
 }
 
 /// What a contact is of.

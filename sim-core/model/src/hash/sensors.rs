@@ -2,8 +2,8 @@
 
 use sim_physics::constants::sensors::{
     AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FramePart,
-    FrameSensor, LimitPart, Place, ProjectionSensor, RayGeom, Reduction, Sensor, SensorKind,
-    Sensors, SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
+    FrameSensor, LimitPart, Place, ProjectionSensor, RangeSensor, RayGeom, RayTables, Reduction,
+    Sensor, SensorKind, Sensors, SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
 };
 
 use super::text::{Text, View, view, words};
@@ -17,9 +17,13 @@ view! {
             "pairs": pairs,
             "geoms": geoms,
         }
+        Later { "triangles": triangles }
         => ranks;
     RayGeom<f64> as "RayGeom":
-        Always { "at": at, "kind": kind, "size": size };
+        Always { "at": at, "kind": kind, "size": size }
+        Later { "boxes": boxes };
+    RayTables as "RayTables":
+        Always { "boxes": boxes, "spans": spans, "triangles": triangles };
     Sensor<f64> as "Sensor":
         Always { "kind": kind, "first": first, "cutoff": cutoff };
     Cutoff<f64> as "Cutoff":
@@ -94,7 +98,11 @@ impl View for SensorKind<f64> {
             SensorKind::TieLimit(ties, part) => text.tuple("TieLimit", &[ties, part]),
             SensorKind::Touch(touch) => text.tuple("Touch", &[touch]),
             SensorKind::Contact(contact) => text.tuple("Contact", &[contact]),
-            SensorKind::Range(site, geoms) => text.tuple("Range", &[site, geoms]),
+            // one that shows a distance has the text of the release that had no other
+            SensorKind::Range(RangeSensor { site, geoms, shows }) => match shows {
+                [true, false, false, false, false, false] => text.tuple("Range", &[site, geoms]),
+                _ => text.tuple("Range", &[site, geoms, shows]),
+            },
             SensorKind::Aimed(frame) => text.tuple("Aimed", &[frame]),
             SensorKind::Projection(projection) => text.tuple("Projection", &[projection]),
             SensorKind::Inside(zone, eye) => text.tuple("Inside", &[zone, eye]),

@@ -30,6 +30,8 @@ recast! {
         pub ranks: Fixed,
         /// What rangefinders see.
         pub geoms: Vec<RayGeom<R>>,
+        /// Triangles of these geoms.
+        pub triangles: RayTables,
     }
 }
 
@@ -43,7 +45,20 @@ recast! {
         pub kind: Option<ZoneKind>,
         /// As MuJoCo's `geom_size` [m].
         pub size: [R; 3],
+        /// The first and the end of its boxes of triangles, if it is made of them.
+        pub boxes: Option<(usize, usize)>,
     }
+}
+
+/// Where the triangles that rays meet are in the tables of a model, in boxes of such that are near.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayTables {
+    /// Centre and half extents of each box, in the axes of its geom. `(boxes, 6)` [m]
+    pub boxes: Fixed,
+    /// First triangle of each box, and the end. Indices. `(boxes, 2)`
+    pub spans: Fixed,
+    /// Corners of each triangle, counter-clockwise from outside. `(triangles, 9)` [m]
+    pub triangles: Fixed,
 }
 
 impl<R> Default for Sensors<R> {
@@ -55,6 +70,7 @@ impl<R> Default for Sensors<R> {
             pairs: Fixed::default(),
             ranks: Fixed::default(),
             geoms: Vec::new(),
+            triangles: RayTables::default(),
         }
     }
 }
@@ -132,8 +148,8 @@ pub enum SensorKind<R> {
     Touch(TouchSensor<R>),
     /// Records of contacts.
     Contact(ContactSensor<R>),
-    /// Distance from a site along its z axis to the nearest of some geoms, or -1 [m].
-    Range(Mount<R>, Vec<usize>),
+    /// What a ray from a site along its z axis meets.
+    Range(RangeSensor<R>),
     /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
     Aimed(AimedSensor<R>),
     /// The pixel of a site in the picture of a camera (MuJoCo: `camprojection`).
@@ -296,6 +312,19 @@ pub struct ContactRates {
 }
 
 recast! {
+    /// What a ray from a site along its z axis meets.
+    #[derive(Clone, Debug)]
+    pub struct RangeSensor<R> {
+        /// The site.
+        pub site: Mount<R>,
+        /// The geoms that it sees.
+        pub geoms: Vec<usize>,
+        /// What it shows: distance, direction, origin, point, normal, depth.
+        pub shows: [bool; 6],
+    }
+}
+
+recast! {
     /// A solid at a site.
     #[derive(Clone, Debug)]
     pub struct Zone<R> {
@@ -395,7 +424,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
             TieLimit(ties, part) => TieLimit(ties.clone(), *part),
             Touch(touch) => Touch(touch.recast()),
             Contact(contact) => Contact(contact.recast()),
-            Range(site, geoms) => Range(site.recast(), geoms.clone()),
+            Range(range) => Range(range.recast()),
             Aimed(frame) => Aimed(frame.recast()),
             Projection(projection) => Projection(projection.recast()),
             Inside(zone, eye) => Inside(zone.recast(), eye.recast()),
@@ -429,4 +458,4 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for Place<R> {
     }
 }
 
-same! { ContactRates, FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }
+same! { ContactRates, RayTables, FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }

@@ -1,10 +1,8 @@
-//! Sensors of contacts and of rays.
+//! Sensors of contacts.
 
 use super::{Reader, Sensed};
-use crate::description::{RayPart, Reduction, Sense, Touching, ZoneKind, ZonePart};
+use crate::description::{Reduction, Sense, Touching, ZoneKind, ZonePart};
 use crate::error::ModelError;
-use crate::mujoco::format::ModelFile;
-use crate::mujoco::frames::on_links;
 
 /// Parts of a contact that a sensor shows besides velocities, and all parts.
 const SHOWN: [u32; 2] = [7, 9];
@@ -75,53 +73,4 @@ impl Reader<'_> {
             _ => Touching::Anything,
         })
     }
-
-    /// The geoms that a rangefinder sees: all but those of its body and invisible ones.
-    pub(super) fn range(&self, k: usize) -> Sensed {
-        if self.shows_more_than_distance(k)? || self.objects[0][k] != "mjOBJ_SITE" {
-            return Ok(Err("rangefinders that show more than a distance".to_owned()));
-        }
-        let site = self.site(k)?;
-        let seen = (0..self.geoms.len()).filter(|&geom| self.geoms[geom].link != site.link);
-        let seen: Vec<usize> = seen.filter(|&geom| self.is_visible[geom]).collect();
-        if seen.iter().any(|&geom| self.rays[geom].is_none()) {
-            return Ok(Err(
-                "rangefinders beside meshes and height fields".to_owned()
-            ));
-        }
-        Ok(Ok(Sense::Range(site, seen)))
-    }
-
-    /// The data of a rangefinder are the bits of its first parameter, of which the first is the distance.
-    pub(super) fn shows_more_than_distance(&self, k: usize) -> Result<bool, ModelError> {
-        let parameters = self.file.rows("sensor_intprm");
-        if parameters == 0 {
-            return Ok(false);
-        }
-        let all = self
-            .file
-            .vectors_of_integers::<3>("sensor_intprm", parameters)?;
-        Ok(all.get(k).is_some_and(|[shows, ..]| *shows > 1))
-    }
-}
-
-/// What rays meet of each geom.
-pub(super) fn rays(file: &ModelFile, bodies: usize) -> Result<Vec<Option<RayPart>>, ModelError> {
-    let geoms = on_links(file, "geom", bodies)?;
-    let kinds = file.kinds("geom_type", geoms.len())?;
-    let sizes = file.vectors::<3>("geom_size", geoms.len())?;
-    let all = geoms.into_iter().zip(kinds).zip(sizes);
-    let all = all.map(|((on, kind), size)| {
-        let kind = match kind.as_str() {
-            "mjGEOM_PLANE" => None,
-            "mjGEOM_SPHERE" => Some(ZoneKind::Sphere),
-            "mjGEOM_CAPSULE" => Some(ZoneKind::Capsule),
-            "mjGEOM_ELLIPSOID" => Some(ZoneKind::Ellipsoid),
-            "mjGEOM_CYLINDER" => Some(ZoneKind::Cylinder),
-            "mjGEOM_BOX" => Some(ZoneKind::Box),
-            _ => return None,
-        };
-        Some(RayPart { on, kind, size })
-    });
-    Ok(all.collect())
 }

@@ -4,6 +4,7 @@ mod cameras;
 mod contacts;
 mod kinds;
 mod objects;
+mod ranges;
 
 use super::format::ModelFile;
 use super::frame;
@@ -12,10 +13,11 @@ use super::names::names;
 use super::options::has_flag;
 use super::rays;
 use super::tendons::{Tendons, moving};
-use crate::description::{OnLink, RayPart, Robot, Sense, Sensor, SensorParts};
+use crate::description::{OnLink, Robot, Sense, Sensor, SensorParts};
 use crate::error::ModelError;
 use crate::pose::Pose;
 use cameras::Cameras;
+use ranges::RayKind;
 
 /// Adds the sensors. `robot` has its joints, constraints and actuators.
 ///
@@ -76,16 +78,7 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
             cutoff: (is_bounded && cutoffs[k] > 0.0).then_some((cutoffs[k], is_two_sided)),
         });
     }
-    // meshes have no part: no ray that is asked for may meet one
-    let unseen = |on: &OnLink| RayPart {
-        on: *on,
-        kind: None,
-        size: [0.0; 3],
-    };
-    let rays = reader.geoms.iter().zip(&reader.rays);
-    parts.geoms = rays
-        .map(|(on, ray)| ray.unwrap_or_else(|| unseen(on)))
-        .collect();
+    reader.add_ray_parts(&mut parts)?;
     if let Some(precompiled) = &mut robot.precompiled {
         precompiled.sensors = parts;
     }
@@ -106,8 +99,8 @@ struct Reader<'a> {
     geoms: Vec<OnLink>,
     sites: Vec<OnLink>,
     is_visible: Vec<bool>,
-    /// Of each geom, what a ray meets; none of a mesh and the like.
-    rays: Vec<Option<RayPart>>,
+    /// Of each geom, what a ray meets.
+    rays: Vec<RayKind>,
     site_kinds: Vec<String>,
     site_sizes: Vec<[f64; 3]>,
     cameras: Cameras,
@@ -122,6 +115,7 @@ impl<'a> Reader<'a> {
         let centers = file.vectors::<3>("body_ipos", bodies)?;
         let turns = file.vectors::<4>("body_iquat", bodies)?;
         let inertial = centers.into_iter().zip(turns);
+        let geoms = on_links(file, "geom", bodies)?;
         let mut late = vec![false; count];
         for (array, width) in [("sensor_delay", 1), ("sensor_interval", 2)] {
             if file.has(array) {
@@ -145,10 +139,10 @@ impl<'a> Reader<'a> {
             joints: moving(robot, file.rows("jnt_type"), file)?,
             tendons: Tendons::read(file, robot)?,
             bodies: inertial.map(|(pos, quat)| frame(pos, quat)).collect(),
-            geoms: on_links(file, "geom", bodies)?,
+            rays: ranges::rays(file, &geoms)?,
+            geoms,
             sites: on_links(file, "site", bodies)?,
             is_visible: rays::visible(file)?,
-            rays: contacts::rays(file, bodies)?,
             site_kinds: file.kinds("site_type", file.rows("site_bodyid"))?,
             site_sizes: file.vectors("site_size", file.rows("site_bodyid"))?,
             cameras: Cameras::read(file, bodies)?,

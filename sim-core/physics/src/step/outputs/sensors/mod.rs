@@ -7,6 +7,7 @@ mod cameras;
 mod contact_rates;
 pub mod contacts;
 mod forces;
+mod ray_meshes;
 mod rays;
 mod states;
 mod zone;

@@ -79,6 +79,54 @@ pub(in crate::step::outputs::sensors) fn distance<F: Num>(
     F::select(ahead, nearest, F::c(-1.0))
 }
 
+/// The normal of length 1 of a solid, outwards, at a point on its surface.
+#[inline(always)]
+pub(in crate::step::outputs::sensors) fn normal<F: Num>(
+    kind: ZoneKind,
+    size: [F::Real; 3],
+    point: Vec3<F>,
+) -> Vec3<F> {
+    let [a, b, c] = size.map(F::k);
+    let (zero, one) = (F::c(0.0), F::c(1.0));
+    let Vec3([x, y, z]) = point;
+    let sign = |x: F| F::select(x.lt(zero), -one, one);
+    let outwards = match kind {
+        ZoneKind::Sphere => point,
+        // the gradient of (x/a)² + (y/b)² + (z/c)²
+        ZoneKind::Ellipsoid => Vec3([x.div(a * a), y.div(b * b), z.div(c * c)]),
+        // from the segment between both ends
+        ZoneKind::Capsule => Vec3([x, y, z - z.min(b).max(-b)]),
+        ZoneKind::Cylinder => {
+            // on an end if that is nearer than the side
+            let side = (a - x.fma(x, y * y).sqrt()).abs();
+            let is_end = (b - z.abs()).abs().lt(side);
+            Vec3([
+                F::select(is_end, zero, x),
+                F::select(is_end, zero, y),
+                F::select(is_end, sign(z), zero),
+            ])
+        }
+        ZoneKind::Box => {
+            // the side that is nearest
+            let (dx, dy, dz) = (
+                (a - x.abs()).abs(),
+                (b - y.abs()).abs(),
+                (c - z.abs()).abs(),
+            );
+            let is_x = !dy.lt(dx) & !dz.lt(dx);
+            let is_y = !is_x & !dz.lt(dy);
+            Vec3([
+                F::select(is_x, sign(x), zero),
+                F::select(is_y, sign(y), zero),
+                F::select(is_x | is_y, zero, sign(z)),
+            ])
+        }
+    };
+    // a point that is on no surface has no normal
+    let length = outwards.dot(outwards).sqrt();
+    outwards * one.div(F::select(zero.lt(length), length, one))
+}
+
 /// The interval in which a ray is in a solid.
 #[inline(always)]
 fn inside<F: Num>(kind: ZoneKind, size: [F::Real; 3], point: Vec3<F>, along: Vec3<F>) -> Span<F> {
