@@ -9,9 +9,9 @@ use crate::model::SensorInfo;
 use crate::pose::Pose;
 use sim_physics::constants::outputs::OutputFrames;
 use sim_physics::constants::sensors::{
-    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FrameSensor,
-    Place, ProjectionSensor, RangeSensor, RayGeom, Sensor, SensorKind, Sensors, TouchSensor,
-    WrenchSensor, Zone,
+    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, DistanceSensor, Eye,
+    FrameSensor, Place, ProjectionSensor, RangeSensor, RayGeom, Sensor, SensorKind, Sensors,
+    TouchSensor, WrenchSensor, Zone,
 };
 use sim_physics::constants::site::Mount;
 use sim_physics::constants::{Dof, Tree};
@@ -206,6 +206,16 @@ impl Scope<'_> {
                     site: mount(site),
                     geoms: geoms.collect(),
                     shows: *shows,
+                })
+            }
+            Sense::Distance { pairs, limit, part } => {
+                let pairs = pairs.iter();
+                SensorKind::Distance(DistanceSensor {
+                    pairs: pairs
+                        .map(|pair| pair.map(|geom| self.first_ray_geom + geom))
+                        .collect(),
+                    limit: *limit,
+                    part: *part,
                 })
             }
             Sense::Aimed { part, of, from } => SensorKind::Aimed(AimedSensor {

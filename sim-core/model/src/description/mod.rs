@@ -32,8 +32,8 @@ pub(crate) use robot::BODY_LINK;
 pub use robot::{Collision, Link, Robot};
 pub use scene::{ContactSensor, Description, HeightScan, Site, Solver, StaticShape};
 pub use sensors::{
-    AimPart, EyePart, FramePart, LimitPart, RayPart, Reduction, Sense, Sensor, SensorParts,
-    SubtreePart, Touching, ZoneKind, ZonePart,
+    AimPart, DistancePart, EyePart, FramePart, LimitPart, RayPart, Reduction, Sense, Sensor,
+    SensorParts, SubtreePart, Touching, ZoneKind, ZonePart,
 };
 pub(crate) use shapes::named;
 pub use tendons::{Length, Span, SpatialTendon, TendonPart, Wrap};

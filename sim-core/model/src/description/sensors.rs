@@ -3,7 +3,9 @@
 use super::output_frames::OnLink;
 use super::tendons::Length;
 use crate::geometry::TriMesh;
-pub use sim_physics::constants::sensors::{FramePart, LimitPart, Reduction, SubtreePart, ZoneKind};
+pub use sim_physics::constants::sensors::{
+    DistancePart, FramePart, LimitPart, Reduction, SubtreePart, ZoneKind,
+};
 
 /// The sensors of a robot, in MuJoCo's order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -124,6 +126,15 @@ pub enum Sense {
         /// What it shows: distance, direction, origin, point, normal, depth.
         shows: [bool; 6],
     },
+    /// How two geoms, or the nearest of several, are apart.
+    Distance {
+        /// Pairs of [`SensorParts::geoms`].
+        pairs: Vec<[usize; 2]>,
+        /// Distance from which on none is near [m].
+        limit: f64,
+        /// What it shows.
+        part: DistancePart,
+    },
     /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
     Aimed {
         /// Which; not the orientation.
@@ -169,6 +180,11 @@ impl Sense {
                 let shown = OF_RAYS.iter().zip(shows).filter(|(_, shown)| **shown);
                 shown.map(|(size, _)| size).sum()
             }
+            Sense::Distance { part, .. } => match part {
+                DistancePart::Distance => 1,
+                DistancePart::Normal => 3,
+                DistancePart::Ends => 6,
+            },
             Sense::Aimed { .. } => 3,
             Sense::Projection { .. } => 2,
             Sense::Frame { part, .. } => 3 + usize::from(*part == FramePart::Quat),

@@ -1,9 +1,10 @@
 //! Sensors of models from MuJoCo.
 
 use sim_physics::constants::sensors::{
-    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, Eye, FramePart,
-    FrameSensor, LimitPart, Place, ProjectionSensor, RangeSensor, RayGeom, RayTables, Reduction,
-    Sensor, SensorKind, Sensors, SubtreePart, TouchSensor, WrenchSensor, Zone, ZoneKind,
+    AccelerationSensor, Aim, AimedSensor, ContactRates, ContactSensor, Cutoff, DistancePart,
+    DistanceSensor, Eye, FramePart, FrameSensor, LimitPart, Place, ProjectionSensor, RangeSensor,
+    RayGeom, RayTables, Reduction, Sensor, SensorKind, Sensors, SubtreePart, TouchSensor,
+    WrenchSensor, Zone, ZoneKind,
 };
 
 use super::text::{Text, View, view, words};
@@ -36,6 +37,8 @@ view! {
         Always { "part": part, "of": of, "from": from };
     ProjectionSensor<f64> as "ProjectionSensor":
         Always { "camera": camera, "site": site, "focal": focal, "middle": middle };
+    DistanceSensor<f64> as "DistanceSensor":
+        Always { "pairs": pairs, "limit": limit, "part": part };
     AccelerationSensor<f64> as "AccelerationSensor":
         Always { "of": of, "is_angular": is_angular, "is_local": is_local };
     WrenchSensor<f64> as "WrenchSensor":
@@ -60,6 +63,7 @@ view! {
 }
 
 words! {
+    DistancePart: Distance "Distance", Normal "Normal", Ends "Ends";
     ZoneKind: Sphere "Sphere", Capsule "Capsule", Ellipsoid "Ellipsoid", Cylinder "Cylinder", Box "Box";
     Reduction: First "First", LeastDistance "LeastDistance", LargestForce "LargestForce", NetForce "NetForce";
     SubtreePart: Center "Center", Velocity "Velocity", AngularMomentum "AngularMomentum";
@@ -103,6 +107,7 @@ impl View for SensorKind<f64> {
                 [true, false, false, false, false, false] => text.tuple("Range", &[site, geoms]),
                 _ => text.tuple("Range", &[site, geoms, shows]),
             },
+            SensorKind::Distance(distance) => text.tuple("Distance", &[distance]),
             SensorKind::Aimed(frame) => text.tuple("Aimed", &[frame]),
             SensorKind::Projection(projection) => text.tuple("Projection", &[projection]),
             SensorKind::Inside(zone, eye) => text.tuple("Inside", &[zone, eye]),

@@ -150,6 +150,8 @@ pub enum SensorKind<R> {
     Contact(ContactSensor<R>),
     /// What a ray from a site along its z axis meets.
     Range(RangeSensor<R>),
+    /// How two geoms, or the nearest of several, are apart.
+    Distance(DistanceSensor<R>),
     /// A property of a frame, as a frame sensor's, where a camera follows something or looks at it.
     Aimed(AimedSensor<R>),
     /// The pixel of a site in the picture of a camera (MuJoCo: `camprojection`).
@@ -325,6 +327,30 @@ recast! {
 }
 
 recast! {
+    /// How two geoms are apart.
+    #[derive(Clone, Debug)]
+    pub struct DistanceSensor<R> {
+        /// Pairs of planes, spheres and capsules, as rays see them. The nearest one counts.
+        pub pairs: Vec<[usize; 2]>,
+        /// Distance from which on none is near [m].
+        pub limit: R,
+        /// What it shows.
+        pub part: DistancePart,
+    }
+}
+
+/// What a sensor shows of two geoms that are apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DistancePart {
+    /// Their distance, negative where they overlap [m].
+    Distance,
+    /// The direction of the segment between them [–].
+    Normal,
+    /// Its ends on the first and on the second geom [m].
+    Ends,
+}
+
+recast! {
     /// A solid at a site.
     #[derive(Clone, Debug)]
     pub struct Zone<R> {
@@ -425,6 +451,7 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for SensorKind<R> {
             Touch(touch) => Touch(touch.recast()),
             Contact(contact) => Contact(contact.recast()),
             Range(range) => Range(range.recast()),
+            Distance(distance) => Distance(distance.recast()),
             Aimed(frame) => Aimed(frame.recast()),
             Projection(projection) => Projection(projection.recast()),
             Inside(zone, eye) => Inside(zone.recast(), eye.recast()),
@@ -458,4 +485,5 @@ impl<S: Real, R: Real + Recast<S, Out = S>> Recast<S> for Place<R> {
     }
 }
 
-same! { ContactRates, RayTables, FramePart, SubtreePart, LimitPart, ZoneKind, Reduction }
+same! { ContactRates, DistancePart, RayTables, FramePart, SubtreePart, LimitPart }
+same! { ZoneKind, Reduction }

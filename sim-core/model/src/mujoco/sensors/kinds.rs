@@ -1,7 +1,9 @@
 //! What sensors measure, by their types.
 
 use super::{Reader, Sensed};
-use crate::description::{AimPart, FramePart, Length, LimitPart, OnLink, Sense, SubtreePart};
+use crate::description::{
+    AimPart, DistancePart, FramePart, Length, LimitPart, OnLink, Sense, SubtreePart,
+};
 use crate::error::ModelError;
 use crate::mujoco::options::has_flag;
 use crate::pose::Pose;
@@ -61,6 +63,9 @@ impl Reader<'_> {
             "TOUCH" => Sense::Touch(self.zone(k, 0)?),
             "CONTACT" => return self.contact(k),
             "RANGEFINDER" => return self.range(k),
+            "GEOMDIST" => return self.distance(k, DistancePart::Distance),
+            "GEOMNORMAL" => return self.distance(k, DistancePart::Normal),
+            "GEOMFROMTO" => return self.distance(k, DistancePart::Ends),
             "CAMPROJECTION" => return self.projection(k),
             "INSIDESITE" => return self.inside(k),
             "ACCELEROMETER" => {

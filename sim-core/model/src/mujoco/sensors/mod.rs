@@ -2,6 +2,7 @@
 
 mod cameras;
 mod contacts;
+mod distances;
 mod kinds;
 mod objects;
 mod ranges;
@@ -69,8 +70,9 @@ pub(super) fn add_sensors(file: &ModelFile, robot: &mut Robot) -> Result<(), Mod
         }
         let is_two_sided = datatypes[k] == "mjDATATYPE_REAL";
         let is_real = is_two_sided || datatypes[k] == "mjDATATYPE_POSITIVE";
-        // MuJoCo bounds no sensor of contacts
-        let is_bounded = is_real && reader.kinds[k] != "mjSENS_CONTACT";
+        // MuJoCo bounds neither sensors of contacts nor points of geoms
+        let unbounded = ["mjSENS_CONTACT", "mjSENS_GEOMFROMTO"];
+        let is_bounded = is_real && !unbounded.contains(&reader.kinds[k].as_str());
         parts.all.push(Sensor {
             name,
             place,

@@ -6,6 +6,7 @@
 mod cameras;
 mod contact_rates;
 pub mod contacts;
+mod distances;
 mod forces;
 mod ray_meshes;
 mod rays;

@@ -9,7 +9,7 @@
 
 use super::ray_meshes::to_triangles;
 use super::zone::{distance, normal};
-use super::{has, put_at};
+use super::{distances, has, put_at};
 use crate::arrays::{Array as A, Workspace};
 use crate::constants::Constants;
 use crate::constants::sensors::{RangeSensor, RayGeom, SensorKind};
@@ -22,7 +22,7 @@ use crate::step::{BlockOf, ConstantsOf, Stage};
 /// Part of a direction towards a plane below which a ray does not meet it (MuJoCo: `mjMINVAL`) [–].
 const PARALLEL: f64 = 1e-15;
 
-/// Rangefinders.
+/// Rangefinders, and distances of geoms.
 pub struct Rays;
 
 impl Stage for Rays {
@@ -30,15 +30,21 @@ impl Stage for Rays {
     const WRITES: &'static [A] = &[A::Sensordata];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
-        has(m, |kind| matches!(kind, SensorKind::Range(..)))
+        use SensorKind::*;
+        has(m, |kind| matches!(kind, Range(_) | Distance(_)))
     }
 
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let zero = C::F::c(0.0);
         for sensor in &m.sensors.all {
-            let SensorKind::Range(range) = &sensor.kind else {
-                continue;
+            let range = match &sensor.kind {
+                SensorKind::Range(range) => range,
+                SensorKind::Distance(distance) => {
+                    distances::show(m, &mut b.work, sensor, distance);
+                    continue;
+                }
+                _ => continue,
             };
             let (far, normal) = nearest(cx, m, &b.work, range);
             // a ray that meets nothing has neither a direction nor a point, but an origin
