@@ -44,7 +44,13 @@ pub(super) fn sensors_of_centers(scene: &Description) -> Vec<String> {
                     let is_inertial = of.is_inertial || from.is_some_and(|from| from.is_inertial);
                     is_inertial && matches!(part, FramePart::Position | FramePart::Velocity)
                 }
+                Some(Sense::Aimed { part, of, from }) => {
+                    let is_inertial =
+                        of.on.is_inertial || from.is_some_and(|from| from.on.is_inertial);
+                    is_inertial && matches!(part, FramePart::Position | FramePart::Velocity)
+                }
                 Some(Sense::Acceleration { of, is_angular, .. }) => of.is_inertial && !is_angular,
+                Some(Sense::Inside(_, eye)) => eye.on.is_inertial,
                 _ => false,
             };
             if moves {

@@ -57,12 +57,12 @@ def scene(mode: str, lens: str) -> str:
 def differences(case: Live, seed: int) -> np.ndarray:
     """Differences to MuJoCo over the largest value of each sensor, `(worlds, sensordata)`."""
     states = case.states(seed)
-    found = case.place(states).sensordata
-    expected = np.zeros_like(found, dtype=float)
+    values = case.place(states).sensordata
+    expected = np.zeros(values.shape)
     for world, data in enumerate(case.data(states)):
         mujoco.mj_forward(case.model, data)
         expected[world] = data.sensordata
-    error = np.abs(found - expected)
+    error = np.abs(values - expected)
     for sensor in range(case.model.nsensor):
         own = slice(case.model.sensor_adr[sensor], case.model.sensor_adr[sensor] + case.model.sensor_dim[sensor])
         error[:, own] /= max(1.0, np.abs(expected[:, own]).max())
@@ -113,3 +113,11 @@ def test_accelerations_of_cameras_that_follow_are_refused_by_name() -> None:
     one = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml), name="m")
     with pytest.raises(tl.TightloopError, match="sensor `a`: no support for accelerations of cameras that track"):
         tl.launch(one, worlds=1, fields=("sensordata",))
+
+
+def test_what_is_at_a_centre_of_mass_that_varies_is_refused() -> None:
+    xml = """<mujoco><worldbody><site name="z" size="1"/><body name="b"><freejoint/><geom size=".1"/></body></worldbody>
+    <sensor><insidesite name="i" site="z" objtype="body" objname="b"/></sensor></mujoco>"""
+    one = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml), name="m")
+    with pytest.raises(tl.TightloopError, match="sensor `i`: no support for a body's centre of mass"):
+        tl.launch(one, worlds=1, params=("body_com",), fields=("sensordata",))
