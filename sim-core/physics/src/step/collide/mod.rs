@@ -251,7 +251,7 @@ fn collide_pair<C: Cx, N: Narrow>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>,
                 a: shape_a,
                 pose_b: &pose_b,
                 b: shape_b,
-                margin: reach + contact_slack(smaller),
+                margin: reach + contact_slack(t, smaller),
                 reach,
                 reference: &t.reference,
                 hull_tables: &t.hulls,
@@ -298,10 +298,14 @@ fn boxes_near<C: Cx, N: Narrow>(
 
 /// Rounding of the distances of a face's corners, for a shape with this radius [m].
 ///
-/// Contacts begin that much early: of a face that just touches, all corners do, not only those that were rounded down.
+/// Contacts begin that much early: of a face that just touches, all corners do, not only those that were rounded down. Models
+/// from MuJoCo in double precision have none, as there.
 #[inline(always)]
-pub(super) fn contact_slack<F: Num>(radius: F) -> F {
-    radius * F::c(2.0 * <F::Real as Real>::EPSILON)
+pub(super) fn contact_slack<F: Num>(t: &Contacts<F::Real>, radius: F) -> F {
+    match <F::Real as Real>::DOUBLE && t.reference.is_used {
+        true => F::c(0.0),
+        false => radius * F::c(2.0 * <F::Real as Real>::EPSILON),
+    }
 }
 
 /// Axes of a shape, by columns.

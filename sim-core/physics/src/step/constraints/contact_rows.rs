@@ -219,7 +219,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
         let position = distance - self.of_pair(cx, pair::MARGIN);
         let smaller = self.of_pair(cx, pair::SMALLER);
-        let pushes = position.lt(contact_slack(smaller));
+        let pushes = position.lt(contact_slack(t, smaller));
         // aref = -b v, and a row exists where its friction is positive
         let mut aref = [zero; 3];
         let mut exists = [zero; 3];
@@ -309,7 +309,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         }
         // a contact past the margin has no force
         let smaller = self.of_pair(cx, pair::SMALLER);
-        let pushes = position.lt(contact_slack(smaller));
+        let pushes = position.lt(contact_slack(t, smaller));
         let stiff = C::F::select(pushes, stiff, zero);
         cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
         // D₀ / (1 + μ²/impratio): the stiffness of a contact that slides

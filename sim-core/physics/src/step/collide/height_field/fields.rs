@@ -146,7 +146,7 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
     let shape = Shape::read(cx, t, N::KIND, p, pair::SIZE_B, pair::HULL_B);
     let size = cx.constant(scalars, p, pair::SMALLER);
     let distance = cx.constant(scalars, p, pair::REACH);
-    let margin = distance + contact_slack(size);
+    let margin = distance + contact_slack(t, size);
     // reaches along the normals of sides, which all prisms share: computed once for the pair
     let reach = FieldReach {
         half: N::half_extents(shape.half_extents(), &axes),
