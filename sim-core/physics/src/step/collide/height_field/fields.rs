@@ -26,6 +26,7 @@ use crate::step::collide::convex::prism_hull::OfHull;
 use crate::step::collide::convex::prisms::{FieldNarrow, OfBox, OfCapsule, OfCylinder, OfSphere};
 use crate::step::collide::manifold::points::{Points, Room};
 use crate::step::collide::narrow::{Shape, ShapePair, ShapePose};
+use crate::step::collide::reference::reference_prism;
 use crate::step::collide::variables::{get3, set3, var3};
 use crate::step::collide::{Stage, axes_of, contact_slack, points_of};
 use crate::step::{BlockOf, ConstantsOf};
@@ -196,7 +197,14 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         each!(cx, at in listed, {
             let number = cx.load(table, at, 0);
             let prism = samples.prism(cx, &cells, number, size);
-            N::contacts(cx, &shapes, &axes, &prism, &mut candidate_points);
+            // in double precision, models from MuJoCo have its points
+            let is_reference = <<C::F as Num>::Real as Real>::DOUBLE && t.reference.is_used;
+            let placed = (&axes, &prism);
+            if !is_reference
+                || !reference_prism(cx, N::KIND, &shapes, placed, &mut candidate_points)
+            {
+                N::contacts(cx, &shapes, &axes, &prism, &mut candidate_points);
+            }
         });
         // prisms and candidates beyond their lists count as contacts left out
         let (none, full) = (C::F::c(0.0), C::F::c(FIELD_CANDIDATES as f64));

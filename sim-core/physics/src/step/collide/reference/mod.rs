@@ -24,10 +24,11 @@ mod sides;
 mod solid;
 mod vector;
 
+use super::convex::prism::Prism;
 use super::manifold::points::Points;
 use super::narrow::{Shape, ShapePair};
 use crate::constants::contact::Kind;
-use crate::constants::hull::reference::ReferenceSearch;
+use crate::constants::hull::reference::{Limits, ReferenceSearch};
 use crate::lane::{Cx, Num, Real};
 use crate::math::vec3::{Mat3, Vec3};
 use clip::Contacts;
@@ -70,7 +71,7 @@ pub fn reference_contacts<C: Cx>(
     };
     // this world is active, or the block would have been skipped
     let always = C::F::c(0.0).lt(C::F::c(1.0));
-    for contact in contacts(solids, margin, search) {
+    for contact in contacts(solids, margin, &search.limits) {
         let point = Vec3(contact.point.map(C::F::c));
         let normal = Vec3(contact.normal.map(|x| C::F::c(x * side)));
         out.add(cx, always, point, C::F::c(contact.distance), normal);
@@ -78,10 +79,49 @@ pub fn reference_contacts<C: Cx>(
     true
 }
 
+/// Adds the contact of a shape of this kind, the first of the pair, and a prism of a height field, whose axes are those of the
+/// second. `axes` are the shape's in these (MuJoCo: `mjc_ConvexHField`).
+#[inline(always)]
+pub fn reference_prism<C: Cx>(
+    cx: &mut C,
+    kind: Kind,
+    pair: &ShapePair<'_, C>,
+    (axes, prism): (&Mat3<C::F>, &Prism<C::F>),
+    out: &mut Points<C>,
+) -> bool {
+    // the centre of the shape is the origin
+    let zero = C::F::c(0.0);
+    let Some(shape) = solid(cx, pair.reference, kind, &pair.a, axes, Vec3([zero; 3])) else {
+        return false;
+    };
+    // MuJoCo's order of corners: from row to row of the field
+    let [p, q, k] = prism.top;
+    let top = match cx.reference(prism.side) > 0.0 {
+        true => [k, p, q],
+        false => [p, q, k],
+    };
+    let top = top.map(|corner| corner.0.map(|x| cx.reference(x)));
+    let bottom = cx.reference(prism.bottom);
+    let margin = cx.reference(pair.reach);
+    // a prism touches in one point
+    let limits = Limits {
+        several: false,
+        ..pair.reference.limits
+    };
+    let always = zero.lt(C::F::c(1.0));
+    for contact in contacts([Solid::prism(top, bottom), shape], margin, &limits) {
+        // in the axes of the pair, from the shape to the field
+        let point = pair.pose_b.axes * Vec3(contact.point.map(C::F::c));
+        let normal = pair.pose_b.axes * Vec3(contact.normal.map(|x| C::F::c(-x)));
+        out.add(cx, always, point, C::F::c(contact.distance), normal);
+    }
+    true
+}
+
 /// One instance for all pairs of kinds.
 #[inline(never)]
-fn contacts(solids: [Solid<'_>; 2], margin: f64, search: &ReferenceSearch) -> Contacts {
-    search::contacts(solids, margin, &search.limits)
+fn contacts(solids: [Solid<'_>; 2], margin: f64, limits: &Limits) -> Contacts {
+    search::contacts(solids, margin, limits)
 }
 
 /// The place of a kind in MuJoCo's order, of those that iterate.

@@ -12,6 +12,9 @@ pub enum Form<'a> {
     Cylinder,
     Box,
     Mesh(&'a ReferenceHull),
+    /// A prism of a height field in the frame of the pair: three corners below, then those above them. All are one corner, so
+    /// that a search against a polytope may end early, as MuJoCo's does.
+    Prism([Point; 6]),
     /// The centre of a sphere.
     Center,
     /// The axis of a capsule.
@@ -28,6 +31,21 @@ pub struct Solid<'a> {
     pub center: Point,
     /// Its axes, by columns [–].
     pub axes: [Point; 3],
+}
+
+impl Solid<'static> {
+    /// The prism below a triangle.
+    pub fn prism(top: [Point; 3], bottom: f64) -> Self {
+        let [a, b, c] = top;
+        let [d, e, f] = top.map(|[x, y, _]| [x, y, bottom]);
+        let sum = [e, f, a, b, c].into_iter().fold(d, add);
+        Solid {
+            form: Form::Prism([d, e, f, a, b, c]),
+            size: [0.0; 3],
+            center: scale(sum, 1.0 / 6.0),
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        }
+    }
 }
 
 impl<'a> Solid<'a> {
@@ -49,12 +67,12 @@ impl<'a> Solid<'a> {
 
     /// Is it a polytope, of which a search ends after finitely many steps?
     fn is_discrete(&self) -> bool {
-        matches!(self.form, Form::Box | Form::Mesh(_))
+        matches!(self.form, Form::Box | Form::Mesh(_) | Form::Prism(_))
     }
 
     /// May it touch in more than a point?
     pub fn has_faces(&self) -> bool {
-        !matches!(self.form, Form::Sphere | Form::Ellipsoid)
+        !matches!(self.form, Form::Sphere | Form::Ellipsoid | Form::Prism(_))
     }
 
     /// Radius and core of a sphere or capsule; none of other shapes.
@@ -97,6 +115,19 @@ impl<'a> Solid<'a> {
                 // bit k of a corner is its sign along axis k
                 let corner = (0..3).map(|k| u32::from(d[k] >= 0.0) << k).sum();
                 ([0, 1, 2].map(|k| signed(d[k], self.size[k])), corner)
+            }
+            Form::Prism(corners) => {
+                // of equally far corners the first counts, from below only where the direction is downward
+                let first = if d[2] < 0.0 { 0 } else { 3 };
+                let farther = |best: usize, k: usize| {
+                    if dot(corners[k], d) > dot(corners[best], d) {
+                        k
+                    } else {
+                        best
+                    }
+                };
+                let corner = farther(farther(first, first + 1), first + 2);
+                return (corners[corner], 0);
             }
             Form::Mesh(hull) => {
                 let corner = hull.farthest(d, last);
