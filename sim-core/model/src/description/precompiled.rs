@@ -61,8 +61,8 @@ pub struct Precompiled {
     /// Most sweeps over the rows of friction after the solver, and the gain of one that ends them, `noslip_iterations` and
     /// `noslip_tolerance` [–].
     pub noslip: (usize, f64),
-    /// When its search for contacts without a closed form ends in `f64`.
-    pub contact_search: Limits,
+    /// When its search for contacts without a closed form ends in `f64`; none where it has tightloop's own points there, too.
+    pub contact_search: Option<Limits>,
     /// Whether the solver handles trees that no constraint couples one by one in `f64`.
     pub islands: bool,
     /// Whether the solver may start from the last step's accelerations in `f64`.

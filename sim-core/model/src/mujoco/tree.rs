@@ -138,18 +138,22 @@ fn parts(
     })
 }
 
-/// When the search for contacts ends; as MuJoCo's does by default for files that older versions wrote.
-fn contact_search(file: &ModelFile) -> Result<Limits, ModelError> {
+/// When the search for contacts ends, as MuJoCo's does by default for files that older versions wrote; none for models that ask
+/// for another one.
+fn contact_search(file: &ModelFile) -> Result<Option<Limits>, ModelError> {
+    if has_flag(file, "mjDSBL_NATIVECCD")? {
+        return Ok(None);
+    }
     let usual = Limits::default();
     let iterations = match file.rows("opt.ccd_iterations") {
         0 => usual.iterations,
         _ => usize::try_from(file.integer("opt.ccd_iterations")?).unwrap_or(0),
     };
-    Ok(Limits {
+    Ok(Some(Limits {
         iterations: iterations.clamp(1, ITERATIONS_MAX),
         tolerance: file.real_or("opt.ccd_tolerance", usual.tolerance)?,
         several: !has_flag(file, "mjDSBL_MULTICCD")?,
-    })
+    }))
 }
 
 /// `ls_tolerance` of files that older versions wrote: MuJoCo's default [–].

@@ -28,7 +28,6 @@ use sim_physics::math::factor::{Pattern, UpdatePath};
 use sim_physics::step::constraints::contact_rows::{EDGES_MAX, edge_stiffness};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// Stiffness of a contact over the mass of what it moves, above which single precision may lose that mass in their sum [–]. Levers
 /// make the entries of a matrix ten times as stiff, so this is a tenth of what the solver allows there.
@@ -42,8 +41,7 @@ pub(super) fn add_contacts(
     rules: &Rules<'_>,
 ) -> Result<(), ModelError> {
     let mut contacts = Contacts::none(scene.solver.cone, scene.solver.impratio);
-    let pieces = pieces(shapes, &mut contacts);
-    Arc::make_mut(&mut contacts.reference).limits = reference::limits(scene);
+    let pieces = pieces(scene, shapes, &mut contacts);
     let filtered = scene.filtered_pairs()?;
     let mut pairs = pairs(shapes, &pieces, rules, &filtered)?;
     // by kind, then in scene order

@@ -237,7 +237,11 @@ fn connected(
 }
 
 /// The pieces of all shapes; their hulls go to the tables.
-pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -> Vec<Piece> {
+pub(super) fn pieces(
+    scene: &Description,
+    shapes: &[PlacedShape<'_>],
+    contacts: &mut Contacts<f64>,
+) -> Vec<Piece> {
     let mut pieces = Vec::new();
     let mut hulls: Vec<Hull> = Vec::new();
     let mut fields = 0;
@@ -302,7 +306,7 @@ pub(super) fn pieces(shapes: &[PlacedShape<'_>], contacts: &mut Contacts<f64>) -
     let (tables, frames) = hull_tables::append(&hulls, with_fans, &mut contacts.tables);
     contacts.hulls = tables;
     let centers = frames.iter().map(|frame| frame.center);
-    contacts.reference = Arc::new(reference::search(shapes, &hulls, centers));
+    contacts.reference = Arc::new(reference::search(scene, shapes, &hulls, centers));
     for piece in pieces
         .iter_mut()
         .filter(|piece| piece.solid.kind == Kind::Hull)

@@ -8,33 +8,36 @@ use sim_physics::constants::hull::reference::{Limits, ReferenceHull, ReferenceSe
 
 /// The search of a scene whose tables have these hulls with these centres.
 pub(super) fn search(
+    scene: &Description,
     shapes: &[PlacedShape<'_>],
     hulls: &[Hull],
     centers: impl Iterator<Item = [f64; 3]>,
 ) -> ReferenceSearch {
-    let is_used = shapes.iter().any(|shape| shape.geom.is_some());
+    let has_geoms = shapes.iter().any(|shape| shape.geom.is_some());
+    let Some(limits) = limits(scene).filter(|_| has_geoms) else {
+        return ReferenceSearch::default();
+    };
     let hulls = hulls.iter().zip(centers);
     ReferenceSearch {
-        is_used,
-        hulls: match is_used {
-            true => hulls
-                .map(|(hull, center)| reference_hull(hull, center))
-                .collect(),
-            false => Vec::new(),
-        },
-        ..ReferenceSearch::default()
+        is_used: true,
+        limits,
+        hulls: hulls
+            .map(|(hull, center)| reference_hull(hull, center))
+            .collect(),
     }
 }
 
-/// When it ends: of several models, the last to end counts.
-pub(super) fn limits(scene: &Description) -> Limits {
-    let limits = precompiled_parts(scene).map(|parts| parts.contact_search);
+/// When it ends: of several models, the last to end counts. None where a model has no such search.
+fn limits(scene: &Description) -> Option<Limits> {
+    let limits: Option<Vec<Limits>> = precompiled_parts(scene)
+        .map(|parts| parts.contact_search)
+        .collect();
     let both = |a: Limits, b: Limits| Limits {
         iterations: a.iterations.max(b.iterations),
         tolerance: a.tolerance.min(b.tolerance),
         several: a.several && b.several,
     };
-    limits.reduce(both).unwrap_or_default()
+    limits?.into_iter().reduce(both)
 }
 
 /// A hull by MuJoCo's polygons, or by its own faces where it has none.
