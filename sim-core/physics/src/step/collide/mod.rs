@@ -18,8 +18,8 @@
 //! | sphere and ellipsoid | the point of the ellipsoid that is nearest to the centre | `primitive/ellipsoids` |
 //! | with an ellipsoid | GJK from the best of a few axes | `primitive/ellipsoids` |
 //! | with a cylinder or a hull | [`convex::pairs`]: axes, GJK, clipping | `primitive/cylinders`, `convex/hulls` |
-//! | the last four, in `f64` models from MuJoCo | MuJoCo's iterations | `reference` |
 //! | height field | a convex prism below each of its triangles | `height_field`, `convex/{prisms,prism_ellipsoid,prism_hull}` |
+//! | in `f64`, of models from MuJoCo: all without a closed form there | MuJoCo's iterations | `reference` |
 
 mod convex;
 mod height_field;

@@ -104,8 +104,8 @@ fn cut(polygon: &Polygon, point: Point, normal: Point, kept: &mut Polygon) {
 /// Which points of a polygon count: of an edge its ends, of many four.
 fn counting(polygon: &Polygon, is_edge: bool) -> ArrayVec<usize, 4> {
     match polygon.len() {
-        5.. => large_quadrilateral(polygon).into(),
         3.. if is_edge => farthest_two(polygon).into_iter().collect(),
+        5.. => large_quadrilateral(polygon).into(),
         count => (0..count).collect(),
     }
 }

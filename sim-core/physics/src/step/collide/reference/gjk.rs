@@ -54,8 +54,9 @@ pub fn search(pair: &mut SolidPair<'_>, limits: &Limits, cutoff: f64) -> Distanc
             break;
         }
         let vertex = pair.farthest(toward_origin(nearest, length));
-        // |x - x*|² is at most x · (x - s), the gap of Frank and Wolfe
-        if dot(nearest, sub(nearest, vertex.point)) < gap_min {
+        // |x - x*|² is at most x · (x - s), the gap of Frank and Wolfe; a centre outside of its shape says nothing
+        let gap = dot(nearest, sub(nearest, vertex.point));
+        if gap < gap_min && !simplex.is_empty() {
             break;
         }
         // a plane at this distance separates them
