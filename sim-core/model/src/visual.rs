@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::geometry::{Shape, TriMesh};
 use crate::pose::Pose;
 
-/// What a part of a link looks like: a `<visual>` of a URDF file, or a geom of MuJoCo's.
+/// What a part of a link looks like: a `<visual>` of a URDF file, or a geom or site of MuJoCo's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
     /// Name of its link.
@@ -61,6 +61,8 @@ pub enum Look {
 pub struct Visuals {
     /// All visuals, in file order.
     pub visuals: Vec<Visual>,
+    /// Sites of a MuJoCo model, which are seen beside whatever a link looks like, in file order.
+    pub sites: Vec<Visual>,
     /// What was left out, one sentence each.
     pub notes: Vec<String>,
 }

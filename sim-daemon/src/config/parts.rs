@@ -23,7 +23,8 @@ pub struct Parts {
 impl SceneFile {
     /// What the scene looks like; paths as in [`SceneFile::describe`].
     ///
-    /// A part has `kind` (`collision`, `visual`, or `bone`: for a robot of which nothing else can be seen), `name`,
+    /// A part has `kind` (`collision`, `visual`, `site`: a visual beside whatever its body shows, or
+    /// `bone`: for a robot of which nothing else can be seen), `name`,
     /// `robot` (`null` for what the scene has itself), `body` (`robot/link` as in the model's list; `null` is the world, and
     /// the world of a MuJoCo model), `pos` and `quat` of its frame in that body's, `shape` (`plane`, `box`, `sphere`,
     /// `cylinder`, `capsule`, `ellipsoid`, `mesh`, `hfield`; of visuals also `nothing`) and `mesh` (a place in the list
@@ -104,8 +105,11 @@ impl SceneFile {
                 let mut counts = HashMap::new();
                 for visual in &visuals.visuals {
                     let count = counts.entry(visual.link.clone()).or_insert(0);
-                    drawing.visual(robot, visual, *count);
+                    drawing.visual("visual", robot, visual, *count);
                     *count += 1;
+                }
+                for (index, site) in visuals.sites.iter().enumerate() {
+                    drawing.visual("site", robot, site, index);
                 }
             }
             Err(error) => drawing.notes.push(format!("robot `{name}`: {error}")),
@@ -194,11 +198,11 @@ impl Drawing {
         }
     }
 
-    /// Adds a visual, the `index`th of its link.
-    fn visual(&mut self, robot: &Robot, visual: &Visual, index: usize) {
+    /// Adds a visual of a kind, whose name is a number where its file has none.
+    fn visual(&mut self, kind: &str, robot: &Robot, visual: &Visual, index: usize) {
         let label = visual.name.clone().unwrap_or_else(|| index.to_string());
         let name = format!("{}/{}/{label}", robot.name, visual.link);
-        let mut part = Place::on_link(robot, &visual.link).part("visual", &name, &visual.pose);
+        let mut part = Place::on_link(robot, &visual.link).part(kind, &name, &visual.pose);
         part["mesh"] = Value::Null;
         part["color"] = json!(visual.color);
         let texture = visual.texture.as_ref();

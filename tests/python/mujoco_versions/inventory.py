@@ -23,7 +23,7 @@ MODEL = {
     "texts and numbers of the user": "name_* names names_map *_user text_* tuple_* numeric_* paths *_pathadr",
     "MuJoCo's own tables": """signature B_* D_* M_* map* bvh_* oct_* efm* *_bvhadr *_bvhnum *_octadr *_octnum
         *_sameframe *_treeid *_treenum tree_bodyadr tree_bodynum tree_dofadr tree_dofnum body_simple dof_simplenum
-        ten_J_* mesh_graph* mesh_poly* mesh_extrema mesh_pos mesh_quat mesh_scale geom_aabb geom_rbound""",
+        ten_J_* mesh_graph* mesh_poly* mesh_extrema mesh_scale geom_aabb geom_rbound""",
     "derived from what is read": """body_rootid body_jntadr body_jntnum body_dofadr body_dofnum body_geomadr
         body_geomnum body_subtreemass body_contype body_conaffinity body_margin dof_bodyid dof_jntid dof_parentid
         dof_Madr dof_M0 tendon_type pair_signature actuator_length0
@@ -35,7 +35,6 @@ MODEL = {
     "refused with delays": "actuator_history* sensor_history*",
     "refused with the flag for sleep": "tree_sleep_policy dof_length",
     "refused with plastic springs": "jnt_plasticadr tendon_plasticadr key_plastic",
-    "refused with sensors on sites of meshes": "site_dataid",
     "read in parts": "opt stat",
 }
 #: Parts of `MjOption` that are not read.

@@ -60,8 +60,8 @@ _ARRAYS = """
     actuator_lengthrange actuator_acc0 actuator_cranklength
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
     cam_bodyid cam_pos cam_quat cam_targetbodyid cam_pos0 cam_poscom0 cam_mat0 cam_fovy cam_resolution cam_sensorsize
-    cam_intrinsic geom_group geom_matid geom_rgba mat_rgba site_size sensor_adr sensor_dim sensor_objid
-    sensor_refid sensor_cutoff
+    cam_intrinsic geom_group geom_matid geom_rgba mat_rgba site_size site_group site_matid site_rgba
+    sensor_adr sensor_dim sensor_objid sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
@@ -69,7 +69,7 @@ _NEWER_ARRAYS = """
     tendon_dampingpoly tendon_stiffnesspoly tendon_springyield pair_adhesion tendon_actfrclimited tendon_actfrcrange
     actuator_delay actuator_armature actuator_damping
     actuator_dampingpoly jnt_actuatorid tendon_actuatorid actuator_ctrlnum actuator_ctrlspec
-    actuator_outnum
+    actuator_outnum site_dataid mesh_pos mesh_quat
     sensor_delay sensor_interval sensor_intprm
 """.split()
 # Enumerations: the array and its type.

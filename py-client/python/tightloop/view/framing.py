@@ -24,12 +24,12 @@ class Framing:
         link: Usual size of a body of the main robot [m], the median; 0.5 if nothing is seen of it.
 
     Args:
-        parts: Parts of one world, of one kind.
+        parts: Parts of one world, of one kind; sites do not count.
         subject: The bodies that count.
     """
 
     def __init__(self, parts: Iterable[Part], subject: Subject) -> None:
-        self._parts = list(parts)
+        self._parts = [part for part in parts if not part.is_site]
         self._ground = ground.extent(self._parts)
         self._subject = subject
         own: dict[int, list[NDArray[np.float64]]] = {body: [] for body in subject.bodies.tolist()}

@@ -1,9 +1,9 @@
 """What a scene looks like: the visuals of its robots' files, and the shapes that touch.
 
-A robot is seen as its file's visuals, and a MuJoCo model as the geoms that MuJoCo's viewer shows. Where a visual cannot
-be read, the collision shapes of that link stand in for all of its visuals, and a note says why. A robot whose file has
-no visuals at all, and what the scene adds, are seen as what touches. Collision meshes touch as convex hulls, and are
-then seen as their files have them.
+A robot is seen as its file's visuals, and a MuJoCo model as the geoms and sites that MuJoCo's viewer shows. Where a
+visual cannot be read, the collision shapes of that link stand in for all of its visuals, and a note says why. A robot
+whose file has no visuals at all, and what the scene adds, are seen as what touches. Collision meshes touch as convex
+hulls, and are then seen as their files have them.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ class Part:
         mesh: Its surface; parts that look alike share one.
         shape: What it is: ``"plane"`` (a sheet around its frame's origin stands for it), ``"box"``, ``"sphere"``,
             ``"cylinder"``, ``"capsule"``, ``"ellipsoid"``, ``"hfield"`` or ``"mesh"``.
+        is_site: Whether it is a site of a MuJoCo model, to which no camera is fitted.
     """
 
     body: int
@@ -67,6 +68,7 @@ class Part:
     pose: NDArray[np.float64]
     mesh: Mesh
     shape: str
+    is_site: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +168,8 @@ class _Assembly:
         for body, own in seen.items():
             if body not in lost:
                 made.extend(own)
+        # beside whatever stands for their bodies
+        made.extend(self._visual(entry) for entry in told if entry["kind"] == "site")
         made.sort(key=lambda part: part.body)
         return made, self._notes
 
@@ -251,7 +255,7 @@ class _Assembly:
 
     def _part(self, entry: dict[str, Any], kind: Kind, mesh: Mesh) -> Part:
         pose = np.array([*entry["pos"], *entry["quat"]])
-        return Part(self._body(entry), kind, entry["name"], pose, mesh, entry["shape"])
+        return Part(self._body(entry), kind, entry["name"], pose, mesh, entry["shape"], is_site=entry["kind"] == "site")
 
     def _body(self, entry: dict[str, Any]) -> int:
         name = entry["body"]

@@ -1,4 +1,5 @@
-//! What a model looks like: the geoms that MuJoCo's viewer shows, whole meshes, in the colours of their materials.
+//! What a model looks like: the geoms and sites that MuJoCo's viewer shows, whole meshes, in the
+//! colours of their materials.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -6,18 +7,19 @@ use std::sync::Arc;
 
 use super::fields::height_field;
 use super::format::ModelFile;
+use super::frame;
 use super::frames::on_links;
 use super::geoms::primitive;
 use super::meshes::Meshes;
 use super::names::names;
-use crate::description::Robot;
+use crate::description::{OnLink, Robot};
 use crate::error::ModelError;
 use crate::geometry::{Shape, TriMesh};
 use crate::visual::{Look, Visual, Visuals};
 
-/// Groups of geoms that MuJoCo's viewer shows at first: those below.
+/// Groups of geoms and of sites that MuJoCo's viewer shows at first: those below.
 const GROUPS_SHOWN: i64 = 3;
-/// `rgba` of a geom that has no colour of its own; it then has its material's [–].
+/// `rgba` of a geom or site that has no colour of its own; it then has its material's [–].
 const NO_COLOR: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 /// Geoms that are not shown: their kinds, and what they are called.
 const LEFT_OUT: [(&str, &str); 1] = [("mjGEOM_SDF", "signed distance field")];
@@ -26,6 +28,7 @@ impl Robot {
     /// Reads what the links of a model that MuJoCo compiled look like; nothing where the file has no looks.
     ///
     /// Of a link, the geoms in groups 0 to 2 are shown; those in other groups if there is no such geom.
+    /// Sites are shown in groups 0 to 2 alone. A file of an older version has no looks of sites.
     ///
     /// # Errors
     /// What is wrong with the file.
@@ -35,8 +38,8 @@ impl Robot {
             let note =
                 "its file has no visual geoms, so what touches is shown; save the scene again";
             return Ok(Visuals {
-                visuals: Vec::new(),
                 notes: vec![note.to_owned()],
+                ..Visuals::default()
             });
         }
         visuals(&file)
@@ -44,56 +47,144 @@ impl Robot {
 }
 
 fn visuals(file: &ModelFile) -> Result<Visuals, ModelError> {
-    let count = file.rows("geom_type");
     let links = names(file, "body", file.rows("body_parentid"))?;
-    let geom_names = names(file, "geom", count)?;
-    let kinds = file.kinds("geom_type", count)?;
-    let places = on_links(file, "geom", links.len())?;
-    let groups = file.integers("geom_group", count)?;
-    let colors = colors(file, count)?;
-    let mut notes = Vec::new();
-    for geom in 0..count {
-        let left_out = LEFT_OUT.iter().find(|(kind, _)| *kind == kinds[geom]);
-        notes.extend(left_out.map(|(_, what)| {
-            let name = &geom_names[geom];
-            format!("geom `{name}`: no support for a {what}; it is not shown")
-        }));
-    }
-    let is_seen = |geom: usize| {
-        let left_out = LEFT_OUT.iter().any(|(kind, _)| *kind == kinds[geom]);
-        !left_out && colors[geom][3] > 0.0
-    };
-    let is_shown = |geom: usize| is_seen(geom) && groups[geom] < GROUPS_SHOWN;
+    let mut surfaces = Surfaces::read(file)?;
+    let geoms = Elements::read(file, "geom", links.len())?;
     let mut dressed = vec![false; links.len()];
-    for geom in (0..count).filter(|&geom| is_shown(geom)) {
-        dressed[places[geom].link] = true;
+    for geom in (0..geoms.names.len()).filter(|&geom| geoms.is_shown(geom)) {
+        dressed[geoms.places[geom].link] = true;
     }
-    let mut surfaces = Surfaces::read(file, count)?;
     let mut visuals = Vec::new();
-    for geom in (0..count).filter(|&geom| is_seen(geom)) {
-        let link = places[geom].link;
-        if dressed[link] && !is_shown(geom) {
-            continue;
+    for geom in (0..geoms.names.len()).filter(|&geom| geoms.is_seen(geom)) {
+        if geoms.is_shown(geom) || !dressed[geoms.places[geom].link] {
+            visuals.push(geoms.visual(geom, &links, &mut surfaces)?);
         }
-        visuals.push(Visual {
-            link: links[link].clone(),
-            name: Some(geom_names[geom].clone()),
-            pose: places[geom].pose,
-            look: surfaces.look(&kinds[geom], geom)?,
-            color: Some(colors[geom].map(|part| part.clamp(0.0, 1.0))),
-            texture: None,
-        });
     }
-    Ok(Visuals { visuals, notes })
+    let mut notes = geoms.notes();
+    let mut sites_shown = Vec::new();
+    if file.has("site_group") {
+        let mut sites = Elements::read(file, "site", links.len())?;
+        sites.move_meshes(file)?;
+        for site in (0..sites.names.len()).filter(|&site| sites.is_shown(site)) {
+            sites_shown.push(sites.visual(site, &links, &mut surfaces)?);
+        }
+        notes.extend(sites.notes());
+    }
+    Ok(Visuals {
+        visuals,
+        sites: sites_shown,
+        notes,
+    })
 }
 
-/// Red, green, blue and opacity of each geom, as MuJoCo draws it under white light, with the mean of its texture.
-fn colors(file: &ModelFile, count: usize) -> Result<Vec<[f64; 4]>, ModelError> {
+/// All geoms or all sites of a model, by their numbers.
+struct Elements {
+    /// `geom` or `site`.
+    kind: &'static str,
+    names: Vec<String>,
+    /// What they are, in MuJoCo's words.
+    shapes: Vec<String>,
+    places: Vec<OnLink>,
+    groups: Vec<i64>,
+    /// Red, green, blue and opacity. `(elements, 4)` [–]
+    colors: Vec<[f64; 4]>,
+    /// `(elements, 3)` [m]
+    sizes: Vec<[f64; 3]>,
+    /// Their meshes or height fields.
+    chosen: Vec<i64>,
+}
+
+impl Elements {
+    fn read(file: &ModelFile, kind: &'static str, bodies: usize) -> Result<Elements, ModelError> {
+        let array = |what: &str| format!("{kind}_{what}");
+        let count = file.rows(&array("type"));
+        Ok(Elements {
+            kind,
+            names: names(file, kind, count)?,
+            shapes: file.kinds(&array("type"), count)?,
+            places: on_links(file, kind, bodies)?,
+            groups: file.integers(&array("group"), count)?,
+            colors: colors(file, kind, count)?,
+            sizes: file.vectors(&array("size"), count)?,
+            // sites of older versions of MuJoCo are no meshes
+            chosen: file.integers_or(&array("dataid"), count, -1)?,
+        })
+    }
+
+    /// Moves sites that are meshes to the frames of their vertices. Of geoms MuJoCo's compiler has done
+    /// that.
+    fn move_meshes(&mut self, file: &ModelFile) -> Result<(), ModelError> {
+        if !file.has("mesh_pos") {
+            return Ok(());
+        }
+        let count = file.rows("mesh_vertadr");
+        let centers = file.vectors::<3>("mesh_pos", count)?;
+        let turns = file.vectors::<4>("mesh_quat", count)?;
+        for (site, on) in self.places.iter_mut().enumerate() {
+            let mesh = usize::try_from(self.chosen[site]).ok();
+            let mesh = mesh.filter(|&mesh| self.shapes[site] == "mjGEOM_MESH" && mesh < count);
+            if let Some(mesh) = mesh {
+                on.pose = on.pose.mul(&frame(centers[mesh], turns[mesh]));
+            }
+        }
+        Ok(())
+    }
+
+    /// What an element is called that is not shown.
+    fn left_out(&self, place: usize) -> Option<&'static str> {
+        let mut all = LEFT_OUT.iter();
+        let known = all.find(|(shape, _)| *shape == self.shapes[place]);
+        known.map(|(_, what)| *what)
+    }
+
+    /// A sentence for each element that cannot be shown.
+    fn notes(&self) -> Vec<String> {
+        let all = self.names.iter().enumerate();
+        let all = all.filter_map(|(place, name)| {
+            let (kind, what) = (self.kind, self.left_out(place)?);
+            Some(format!(
+                "{kind} `{name}`: no support for a {what}; it is not shown"
+            ))
+        });
+        all.collect()
+    }
+
+    /// Can it be seen, if its group is shown?
+    fn is_seen(&self, place: usize) -> bool {
+        self.left_out(place).is_none() && self.colors[place][3] > 0.0
+    }
+
+    fn is_shown(&self, place: usize) -> bool {
+        self.is_seen(place) && self.groups[place] < GROUPS_SHOWN
+    }
+
+    fn visual(
+        &self,
+        place: usize,
+        links: &[String],
+        surfaces: &mut Surfaces<'_>,
+    ) -> Result<Visual, ModelError> {
+        let on = &self.places[place];
+        let look = surfaces.look(&self.shapes[place], self.sizes[place], self.chosen[place])?;
+        Ok(Visual {
+            link: links[on.link].clone(),
+            name: Some(self.names[place].clone()),
+            pose: on.pose,
+            look,
+            color: Some(self.colors[place].map(|part| part.clamp(0.0, 1.0))),
+            texture: None,
+        })
+    }
+}
+
+/// Red, green, blue and opacity of each geom or site, as MuJoCo draws it under white light, with the
+/// mean of its texture.
+fn colors(file: &ModelFile, kind: &str, count: usize) -> Result<Vec<[f64; 4]>, ModelError> {
     let materials = file.rows("mat_rgba");
     let of_materials = file.vectors::<4>("mat_rgba", materials)?;
     let textures = file.vectors::<3>("mat_texture_mean", materials)?;
-    let chosen = file.indices("geom_matid", count, materials)?;
-    let rgba = file.vectors::<4>("geom_rgba", count)?;
+    let chosen = file.indices(&format!("{kind}_matid"), count, materials)?;
+    let rgba = file.vectors::<4>(&format!("{kind}_rgba"), count)?;
     let all = rgba.into_iter().zip(chosen).map(|(rgba, material)| {
         let Some(material) = material else {
             return rgba;
@@ -113,28 +204,24 @@ fn colors(file: &ModelFile, count: usize) -> Result<Vec<[f64; 4]>, ModelError> {
     Ok(all.collect())
 }
 
-/// Geometry of geoms. Geoms with the same mesh share its triangles.
+/// Geometry of geoms and sites. Those with the same mesh share its triangles.
 struct Surfaces<'a> {
     file: &'a ModelFile,
-    sizes: Vec<[f64; 3]>,
-    chosen: Vec<i64>,
     meshes: Meshes<'a>,
     known: HashMap<i64, Arc<TriMesh>>,
 }
 
 impl<'a> Surfaces<'a> {
-    fn read(file: &'a ModelFile, count: usize) -> Result<Surfaces<'a>, ModelError> {
+    fn read(file: &'a ModelFile) -> Result<Surfaces<'a>, ModelError> {
         Ok(Surfaces {
             file,
-            sizes: file.vectors("geom_size", count)?,
-            chosen: file.integers("geom_dataid", count)?,
             meshes: Meshes::read(file)?,
             known: HashMap::new(),
         })
     }
 
-    fn look(&mut self, kind: &str, geom: usize) -> Result<Look, ModelError> {
-        let size = self.sizes[geom];
+    /// The geometry of an element of a kind and size, and with its mesh or height field.
+    fn look(&mut self, kind: &str, size: [f64; 3], chosen: i64) -> Result<Look, ModelError> {
         if let Some(shape) = primitive(kind, size) {
             return Ok(Look::Shape(shape));
         }
@@ -147,22 +234,21 @@ impl<'a> Surfaces<'a> {
                 }),
             },
             "mjGEOM_HFIELD" => {
-                let field = height_field(self.file, self.chosen[geom])?;
+                let field = height_field(self.file, chosen)?;
                 Look::Shape(Shape::HeightField(Arc::new(field)))
             }
             "mjGEOM_MESH" => {
-                let mesh = self.chosen[geom];
-                if !self.known.contains_key(&mesh) {
-                    let surface = Arc::new(self.meshes.triangles(mesh)?);
-                    self.known.insert(mesh, surface);
+                if !self.known.contains_key(&chosen) {
+                    let surface = Arc::new(self.meshes.triangles(chosen)?);
+                    self.known.insert(chosen, surface);
                 }
                 Look::Triangles {
                     kind: "mesh",
-                    surface: self.known[&mesh].clone(),
+                    surface: self.known[&chosen].clone(),
                 }
             }
             other => {
-                let fault = format!("has geoms of the unknown kind {other}");
+                let fault = format!("has geoms or sites of the unknown kind {other}");
                 return Err(self.file.fault(fault));
             }
         })

@@ -62,6 +62,7 @@ impl Robot {
         Ok(Visuals {
             visuals: all,
             notes: looks.notes,
+            ..Visuals::default()
         })
     }
 }

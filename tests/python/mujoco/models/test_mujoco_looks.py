@@ -1,7 +1,8 @@
-"""What MuJoCo models look like: the geoms that MuJoCo's viewer shows, where they are, in their colours."""
+"""What MuJoCo models look like: the geoms and sites that MuJoCo's viewer shows, where they are, in their colours."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +16,8 @@ import tightloop as tl
 from tightloop import optional_imports
 from tightloop.mujoco import textures
 from tightloop.view import Camera, Picture
-from tightloop.view.meshes import paint
+from tightloop.view.framing import Framing
+from tightloop.view.meshes import grid, paint
 from tightloop.view.parts import Parts, parts
 from tightloop.view.poses import place
 
@@ -46,6 +48,21 @@ MODEL = f"""<mujoco model="looks"><asset>{NOTCHED}
   <geom name="again" type="mesh" mesh="notched" contype="0" conaffinity="0" pos="0 0 -.3"/>
   <geom name="rod" type="cylinder" size=".1 .2" group="3"/></body>
 </worldbody></mujoco>"""
+SITES = """<mujoco model="sites"><asset>
+<texture name="squares" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 .5" width="64" height="64"/>
+<material name="blue" rgba="0 0 1 1"/><material name="squares" texture="squares" rgba=".5 1 1 .75"/>
+</asset><worldbody>
+<site name="still" type="box" size=".1 .2 .3" pos="1 0 2" euler="10 20 30"/>
+<site name="hidden" group="3"/><site name="clear" rgba="1 0 0 0"/>
+<body name="mocap" mocap="true" pos="0 1 1"><geom size=".05" contype="0" conaffinity="0"/>
+  <site name="fromto" type="capsule" size=".1" fromto="0 0 0 0 .6 .8"/></body>
+<body name="moving" pos="0 0 2" euler="20 30 40"><freejoint/>
+  <geom name="box" type="box" size=".1 .1 .1"/>
+  <site name="ellipsoid" type="ellipsoid" size=".1 .2 .3" material="blue" group="2" pos=".1 .2 .3"/>
+  <site name="cylinder" type="cylinder" size=".1 .2" material="blue" rgba="1 0 0 .5" group="1" euler="0 50 0"/>
+  <site name="box" rgba="1 0 1 1" size=".2"/>
+  <site name="squares" material="squares"/><site/></body>
+</worldbody></mujoco>"""
 
 
 @pytest.fixture(autouse=True)
@@ -64,6 +81,21 @@ def seen(xml: str, kind: str = "visual") -> dict:
 
 def spec(xml: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(xml)
+
+
+def sites_of(found: Parts) -> list:
+    return [part for part in found if part.is_site]
+
+
+def viewed(model: mujoco.MjModel) -> dict:
+    """What MuJoCo's viewer draws of sites at first, at the start, by their names."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    drawn = mujoco.MjvScene(model, maxgeom=100)
+    options, grip, camera = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.MjvCamera()
+    mujoco.mjv_updateScene(model, data, options, grip, camera, mujoco.mjtCatBit.mjCAT_ALL.value, drawn)
+    shapes = [shape for shape in drawn.geoms[: drawn.ngeom] if shape.objtype == mujoco.mjtObj.mjOBJ_SITE]
+    return {model.site(shape.objid).name or f"site{shape.objid}": shape for shape in shapes}
 
 
 def start(model: mujoco.MjModel) -> np.ndarray:
@@ -176,6 +208,19 @@ def test_looks_change_no_physics(tmp_path):
     assert others - names == {"looks/dressed/hull", "looks/mesh/rod"}
 
 
+def test_looks_of_sites_change_no_physics(tmp_path):
+    scene = tl.Scene.from_mujoco(spec(SITES))
+
+    def hide_most(arrays):
+        arrays["site_rgba"][:] = 0.3
+        arrays["site_group"][1:] = 4
+        arrays["site_matid"][:] = -1
+
+    other = changed(scene, hide_most, tmp_path / "other.safetensors")
+    assert tl.Dynamics(other).model_hash == tl.Dynamics(scene).model_hash
+    assert [part.name for part in sites_of(parts_of(other))] == ["sites/world/still"]
+
+
 @pytest.mark.parametrize("array", ["geom_group", "mat_texture_mean"])
 def test_an_older_file_shows_what_touches(tmp_path, array):
     scene = tl.Scene.from_mujoco(spec(MODEL))
@@ -185,8 +230,21 @@ def test_an_older_file_shows_what_touches(tmp_path, array):
     assert len(older.notes) == 1 and "save the scene again" in older.notes[0]
 
 
-def test_a_saved_scene_needs_no_mujoco_for_its_looks(tmp_path, monkeypatch):
-    scene = tl.Scene.from_mujoco(spec(MODEL))
+def test_an_older_file_shows_no_sites(tmp_path):
+    scene = tl.Scene.from_mujoco(spec(SITES))
+
+    def age(arrays):
+        for array in ("site_group", "site_matid", "site_rgba"):
+            del arrays[array]
+
+    older, newer = parts_of(changed(scene, age, tmp_path / "older.safetensors")), parts_of(scene)
+    assert not sites_of(older) and not older.notes
+    assert [part.name for part in older] == [part.name for part in newer if not part.is_site]
+
+
+@pytest.mark.parametrize("xml", [MODEL, SITES])
+def test_a_saved_scene_needs_no_mujoco_for_its_looks(tmp_path, monkeypatch, xml):
+    scene = tl.Scene.from_mujoco(spec(xml))
     scene.save(tmp_path / "scene.toml")
     monkeypatch.setattr(optional_imports, "import_module", _missing)
     loaded = tl.Scene.load(tmp_path / "scene.toml")
@@ -203,6 +261,85 @@ def test_a_shape_of_the_scene_on_a_link_is_seen_with_its_geoms():
     found = parts(f"{scene.to_toml()}\n{extra}", "/", tl.Dynamics(scene).body_names)
     names = {part.name for part in found.of("visual")}
     assert {"looks/dressed/extra", "looks/dressed/plain"} <= names and "looks/dressed/hull" not in names
+
+
+def test_sites_are_seen_as_mujocos_viewer_shows_them():
+    model = spec(SITES).compile()
+    scene = tl.Scene.from_mujoco(model)
+    (body_q,) = tl.Dynamics(scene).forward_kinematics(start(model))
+    found = {part.name.rpartition("/")[2]: part for part in sites_of(parts_of(scene))}
+    wanted = viewed(model)
+    assert found.keys() == wanted.keys() and len(wanted) == 7
+    kinds = {"sphere": "SPHERE", "capsule": "CAPSULE", "ellipsoid": "ELLIPSOID", "cylinder": "CYLINDER", "box": "BOX"}
+    for name, shape in wanted.items():
+        part = found[name]
+        assert part.kind == "visual" and mujoco.mjtGeom(shape.type).name == f"mjGEOM_{kinds[part.shape]}"
+        own = place(part.pose, part.mesh.vertices)
+        local = ((own if part.body < 0 else place(body_q[part.body], own)) - shape.pos) @ shape.mat
+        half = shape.size + np.array([0, 0, shape.size[0] if part.shape == "capsule" else 0])
+        # round surfaces have corners on them
+        np.testing.assert_allclose(np.abs(local).max(axis=0), half, rtol=0.05, atol=ATOL)
+        rgba = shape.rgba * [0.5, 0, 0.25, 1] if name == "squares" else shape.rgba
+        np.testing.assert_allclose(color(part), 255 * rgba, atol=1)
+
+
+def test_sites_that_are_meshes_are_where_mujocos_viewer_has_them():
+    xml = f"""<mujoco model="m"><asset>{NOTCHED}</asset><worldbody><body pos="0 0 1" euler="10 20 30"><freejoint/>
+    <geom size=".1"/><site name="mesh" type="mesh" mesh="notched" pos=".1 .2 .3" euler="30 20 10"/></body></worldbody>
+    </mujoco>"""
+    if not hasattr(spec(MODEL).compile(), "site_dataid"):
+        pytest.skip("this version of MuJoCo has no sites that are meshes")
+    model = spec(xml).compile()
+    scene = tl.Scene.from_mujoco(model)
+    (body_q,) = tl.Dynamics(scene).forward_kinematics(start(model))
+    (part,) = sites_of(parts_of(scene))
+    shape = viewed(model)["mesh"]
+    corners = place(body_q[part.body], place(part.pose, part.mesh.vertices))
+    np.testing.assert_allclose(corners, model.mesh_vert @ shape.mat.T + shape.pos, atol=ATOL)
+
+
+def test_sites_touch_nothing_and_take_no_geoms_place():
+    assert set(seen(SITES, "collision")) == {"box"}
+    # hidden geoms of a body without others, geoms that are all clear, and joints of a model without geoms
+    for inside, kept in (
+        ('<geom name="hull" size=".1" group="3"/>', {"m/b/hull"}),
+        ('<geom name="clear" size=".1" rgba="0 0 0 0"/>', {"m/b/clear"}),
+        ('<inertial pos="0 0 -.5" mass="1" diaginertia=".1 .1 .1"/>', {"m/b/bone1"}),
+    ):
+        xml = f"""<mujoco model="m"><worldbody><body name="b"><joint axis="0 1 0"/>{inside}<site name="s"/></body>
+        </worldbody></mujoco>"""
+        names = {part.name for part in parts_of(tl.Scene.from_mujoco(spec(xml))).of("visual")}
+        assert kept | {"m/b/s"} <= names, inside
+
+
+def test_no_camera_is_fitted_to_sites():
+    far = SITES.replace('pos="1 0 2"', 'pos="90 0 2"').replace('pos=".1 .2 .3"', 'pos="0 40 0"')
+    none = re.sub(r"<site[^>]*/>", "", SITES)
+    found, without = (parts_of(tl.Scene.from_mujoco(spec(xml))) for xml in (far, none))
+    assert sites_of(found) and not sites_of(without)
+    body_q = tl.Dynamics(tl.Scene.from_mujoco(spec(SITES))).forward_kinematics(start(spec(SITES).compile()))
+    framings = [Framing(own.of("visual"), own.subject) for own in (found, without)]
+    assert framings[0].link == framings[1].link
+    points = [framing.points(body_q, np.zeros((1, 3))) for framing in framings]
+    np.testing.assert_array_equal(points[0], points[1])
+    np.testing.assert_array_equal(grid.extent(found, body_q[0]), grid.extent(without, body_q[0]))
+
+
+def test_a_picture_shows_sites_and_their_bodies_carry_them():
+    model = spec(SITES).compile()
+    scene = tl.Scene.from_mujoco(model)
+    coords = start(model)
+    view = Camera((6, -6, 4), (1, 0, 2))
+
+    def purple(kind):
+        shown = SimpleNamespace(body_q=tl.Dynamics(scene).forward_kinematics(coords))
+        picture = Picture(parts_of(scene), 240, 180, kind=kind).render(shown, camera=view).astype(int)
+        return np.argwhere(picture[..., [0, 2]].min(axis=-1) - picture[..., 1] > 60)
+
+    before = purple("visual")
+    assert len(before) > 50 and len(purple("collision")) == 0
+    coords[0, 2] += 0.5
+    assert purple("visual")[:, 0].mean() < before[:, 0].mean() - 5
 
 
 def test_height_fields_are_seen():

@@ -23,7 +23,7 @@ _LEAST_SIZE = 0.5
 
 
 def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
-    """Return the bounding box of one world without floors [m].
+    """Return the bounding box of one world without floors and sites [m].
 
     Args:
         parts: Parts of the world.
@@ -34,7 +34,8 @@ def extent(parts: Iterable[Part], body_q: Array) -> NDArray[np.float64]:
     """
     found: list[Array] = []
     for part in parts:
-        if part.body < 0 and np.max(np.ptp(part.mesh.vertices, axis=0)) > _FLOOR_SIZE:
+        is_floor = part.body < 0 and np.max(np.ptp(part.mesh.vertices, axis=0)) > _FLOOR_SIZE
+        if is_floor or part.is_site:
             continue
         points = outline(part.mesh)
         placed = place(IDENTITY if part.body < 0 else body_q[part.body], place(part.pose, points))
