@@ -39,7 +39,7 @@ MODEL = {
 }
 #: Parts of `MjOption` that are not read.
 OPTIONS = {
-    "of MuJoCo's numerical methods": "jacobian ccd_iterations ccd_tolerance sdf_*",
+    "of MuJoCo's numerical methods": "jacobian sdf_*",
     "refused with the flag for override": "o_*",
     "refused with the flag for sleep": "sleep_tolerance",
 }

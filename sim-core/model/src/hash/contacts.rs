@@ -6,7 +6,7 @@ use sim_physics::constants::contact::{
 };
 use sim_physics::constants::height_field::FieldTables;
 use sim_physics::constants::hull::HullTables;
-use sim_physics::constants::hull::reference::{Limits, ReferenceSearch};
+use sim_physics::constants::hull::reference::ReferenceSearch;
 use sim_physics::constants::pair_groups::Group;
 use sim_physics::lane::{Fixed, Table, Tables};
 
@@ -37,7 +37,7 @@ view! {
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         Never { "ordered_corners": ordered_corners }
-        Later { "contact_search": reference }
+        Never { "reference": reference }
         => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
     Handles as "Handles":
         Always {
@@ -133,25 +133,9 @@ words! {
         Ellipsoid "Ellipsoid", Hull "Hull";
 }
 
-/// By when it ends: hulls are in the tables.
+/// How contacts are found in `f64`: no part of the text, since recordings in `f32` do not depend on it.
 impl View for Arc<ReferenceSearch> {
-    fn write(&self, text: &mut Text) {
-        let Limits {
-            iterations,
-            tolerance,
-            several,
-        } = &self.limits;
-        let values: [(&str, &dyn View); 3] = [
-            ("iterations", iterations),
-            ("tolerance", tolerance),
-            ("several", several),
-        ];
-        text.groups("ContactSearch", &[(When::Always, &values)]);
-    }
-
-    fn is_absent(&self) -> bool {
-        self.limits == Limits::default()
-    }
+    fn write(&self, _: &mut Text) {}
 }
 
 impl View for Table {

@@ -145,17 +145,23 @@ fn contact_search(file: &ModelFile) -> Result<Option<Limits>, ModelError> {
         return Ok(None);
     }
     let usual = Limits::default();
+    let tolerance = file.real_or("opt.ccd_tolerance", usual.tolerance)?;
+    if !tolerance.is_finite() {
+        return Err(file.fault(format!("opt.ccd_tolerance is {tolerance}; give a number")));
+    }
     let iterations = match file.rows("opt.ccd_iterations") {
         0 => usual.iterations,
         _ => usize::try_from(file.integer("opt.ccd_iterations")?).unwrap_or(0),
     };
     Ok(Some(Limits {
         iterations: iterations.clamp(1, ITERATIONS_MAX),
-        tolerance: file.real_or("opt.ccd_tolerance", usual.tolerance)?,
+        tolerance: tolerance.max(TOLERANCE_MIN),
         several: !has_flag(file, "mjDSBL_MULTICCD")?,
     }))
 }
 
+/// Least `ccd_tolerance`, below which lengths count as 0 (MuJoCo: `mjMINVAL`) [m].
+const TOLERANCE_MIN: f64 = 1e-15;
 /// `ls_tolerance` of files that older versions wrote: MuJoCo's default [–].
 const LS_TOLERANCE: f64 = 0.01;
 /// The same of `noslip_tolerance` [–].

@@ -192,7 +192,7 @@ def test_points_are_mujocos_where_a_pair_keeps_all(geom: str, margin: float) -> 
     few = np.array([0 < len(theirs.distance) <= KEPT for theirs in both.theirs])
     same = same_contacts(both, 1e-9)
     print(f"{geom}: {few.sum()} of 300, {same[few].mean()}")
-    # round shapes may end elsewhere where a pose differs by a rounding
+    # round shapes end elsewhere where a pose differs by a rounding, as they do in MuJoCo
     assert few.sum() > 60 and same[few].mean() > (0.98 if geom in ("box", "mesh") else 0.85)
     size = np.maximum(1.0, abs(both.their_qacc).max(1))
     assert (abs(both.our_qacc - both.their_qacc).max(1) / size)[same].max() < 1e-6

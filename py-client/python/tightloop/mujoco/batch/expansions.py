@@ -61,6 +61,12 @@ def is_idle(name: str) -> bool:
     return name.startswith(_IDLE)
 
 
+def _senses_cameras(model: Any) -> bool:
+    """Whether some sensor is of a camera, or seen from one."""
+    camera = int(mujoco.mjtObj.mjOBJ_CAMERA)
+    return any(camera in np.asarray(kinds) for kinds in (model.sensor_objtype, model.sensor_reftype))
+
+
 def can_vary(name: str) -> bool:
     """Whether a field may differ between simulations."""
     return name in _VARYING
@@ -100,6 +106,10 @@ class Expansions:
         # of MjOption scalars expand, too; those of MjModel are sizes
         value = getattr(self._model.opt, name, None)
         return None if value is None or callable(value) else np.asarray(value, type(value))
+
+    def _is_idle(self, name: str) -> bool:
+        # cameras move nothing, but sensors may be of them
+        return is_idle(name) and not (name.startswith("cam_") and _senses_cameras(self._model))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -257,7 +267,7 @@ class Expansions:
         fields = {}
         for name, array in self._arrays.items():
             if not self._is_parameter(name):
-                if not (name in CONSTANTS or is_idle(name)) and (needs := self.differs(name, ids)).any():
+                if not (name in CONSTANTS or self._is_idle(name)) and (needs := self.differs(name, ids)).any():
                     fields[name] = needs, array[ids]
                 continue
             self._check_finite(name, ids)
@@ -274,7 +284,7 @@ class Expansions:
             ArgumentError: One has not; the message has the simulation and the field.
         """
         for name, array in self._arrays.items():
-            is_choice = name in _CHOICES or not hasattr(self._model, name) or is_idle(name)
+            is_choice = name in _CHOICES or not hasattr(self._model, name) or self._is_idle(name)
             if array.dtype.kind not in "iub" or is_choice or name in free:
                 continue
             differs = self.differs(name, ids)
@@ -311,7 +321,7 @@ class Expansions:
         """
         self.check_sleep(ids)
         for name in self._arrays:
-            if self._is_parameter(name) or name in CONSTANTS or is_idle(name):
+            if self._is_parameter(name) or name in CONSTANTS or self._is_idle(name):
                 continue
             differs = self.differs(name, ids)
             if differs.any():

@@ -54,6 +54,7 @@ fn reference_hull(hull: &Hull, center: [f64; 3]) -> Option<ReferenceHull> {
         true => faces.collect(),
         false => polygons.collect(),
     };
+    // a mesh of MuJoCo has the origin of its vertices as its centre, which is inside of it
     let origin = center.map(|x| -x);
     ReferenceHull::new(origin, hull.vertices.clone(), sides.into_iter())
 }

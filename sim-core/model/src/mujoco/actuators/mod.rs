@@ -105,22 +105,27 @@ impl Activations {
         let counts = file.integers("actuator_actnum", count)?;
         let firsts = file.integers("actuator_actadr", count)?;
         let kinds = file.kinds("actuator_dyntype", count)?;
+        let parameters = file.vectors::<10>("actuator_dynprm", count)?;
         let mut next = 0;
-        for (kind, (count, first)) in kinds.iter().zip(counts.iter().zip(firsts)) {
+        let parts = kinds.iter().zip(&parameters);
+        for ((kind, [time, ..]), (count, first)) in parts.zip(counts.iter().zip(firsts)) {
             if *count > 0 && first != next {
                 return Err(file.fault("has activations in another order".to_owned()));
             }
             // a motor has one if it has inductance
-            let most = i64::from(kind != "mjDYN_NONE");
-            let is_motor = kind == "mjDYN_DCMOTOR";
-            if *count > most || (*count < most && !is_motor) {
+            let has_one = match kind.as_str() {
+                "mjDYN_NONE" => false,
+                "mjDYN_DCMOTOR" => *time > 0.0,
+                _ => true,
+            };
+            if *count != i64::from(has_one) {
                 return Err(file.fault(format!("has {count} activations of kind {kind}")));
             }
             next += count;
         }
         Ok(Activations {
             kinds,
-            parameters: file.vectors::<10>("actuator_dynprm", count)?,
+            parameters,
             ranges: ranges(file, "act", count)?,
             early: file.integers("actuator_actearly", count)?,
         })

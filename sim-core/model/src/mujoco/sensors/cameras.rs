@@ -69,6 +69,9 @@ impl Cameras {
 impl Reader<'_> {
     /// The pixel of a site in the picture of a camera.
     pub(super) fn projection(&self, k: usize) -> Sensed {
+        if self.objects[1][k] != "mjOBJ_CAMERA" {
+            return Err(self.fault(k));
+        }
         let camera = match self.eye(k, 1)? {
             Ok(camera) => camera,
             Err(what) => return Ok(Err(what)),

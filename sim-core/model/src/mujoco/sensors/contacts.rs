@@ -42,6 +42,10 @@ impl Reader<'_> {
         if shows >> SHOWN[1] != 0 {
             return Ok(Err("other data of contacts".to_owned()));
         }
+        // a sum of forces has no velocity: MuJoCo compiles no such sensor
+        if reduction > 2 && shows >> SHOWN[0] != 0 {
+            return Err(self.fault(k));
+        }
         let first = self.touching(k, 0)?;
         Ok(Ok(Sense::Contact {
             zone: match first {
