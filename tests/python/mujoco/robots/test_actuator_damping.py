@@ -104,8 +104,8 @@ def test_parameters_of_joints_have_the_share_of_actuators():
     robot = model()
     with live(robot, worlds=1, params=("joint_armature", "joint_damping")) as case:
         # the hinge: 9 · 0.004 + 4 · 0.01, and 9 · 0.05; the slide: 0.25 · 0.4
-        np.testing.assert_allclose(case.sim.params["joint_armature"][0, :2], [0.086, 0.01], rtol=1e-12)
-        np.testing.assert_allclose(case.sim.params["joint_damping"][0, :2], [0.55, 0.1], rtol=1e-12)
+        np.testing.assert_allclose(case.sim.params.joint_armature[0, :2], [0.086, 0.01], rtol=1e-12)
+        np.testing.assert_allclose(case.sim.params.joint_damping[0, :2], [0.55, 0.1], rtol=1e-12)
 
 
 @pytest.mark.parametrize("field", ["dof_armature", "dof_damping"])
