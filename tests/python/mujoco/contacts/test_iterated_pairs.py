@@ -1,7 +1,7 @@
 """Pairs of geoms without a closed form, in f64: MuJoCo's points, distances, normals and accelerations, and its runs.
 
-MuJoCo's iterations end at a tolerance, so their result depends on their path. Ours takes the same one. With round shapes
-the last bit of a pose may decide where a path goes: ours then is that of MuJoCo in a pose that differs by a rounding.
+MuJoCo's iterations end at a tolerance, so their result depends on their path. Ours takes the same one. With round
+shapes the last bit of a pose may decide where a path goes: ours then is MuJoCo's in a pose that differs by a rounding.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import tightloop as tl
 from tiers import nightly
 
 WORLDS = [500, nightly(5_000)]
-#: Poses that differ by a rounding, of each state whose points are not MuJoCo's in its very pose; and that rounding [m or –].
+#: Poses a rounding away that are tried where the points are not MuJoCo's in the very pose, and that rounding [m or –].
 NEIGHBOURS, ROUNDING = 100, 3e-16
 #: Share of states that may have another point than all of them.
 ELSEWHERE = 0.01
@@ -77,7 +77,7 @@ def nearly_flat(rng: Generator) -> Array:
 
 
 def unlike(model: mujoco.MjModel, qpos: Array) -> tuple[list[str], Array]:
-    """What is not MuJoCo's in any pose a rounding away, for each state that differs, and how many points states have."""
+    """What is not MuJoCo's in any pose a rounding away, of each state that differs; how many points states have."""
     points, qacc = pair_points(model, qpos)
     rng, data, wrong = np.random.default_rng(11), mujoco.MjData(model), []
     for pose, ours, acceleration in zip(qpos, points, qacc, strict=True):
@@ -122,6 +122,54 @@ def test_without_multiccd_each_pair_has_one_point():
     rng = np.random.default_rng(9)
     model = model_of(rng, "box brick", 0.0, flags='<flag multiccd="disable"/>')
     assert assert_mujocos(model, np.array([nearly_flat(rng) for _ in range(200)])).max() == 1
+
+
+@pytest.mark.parametrize("tolerance", ["0", "-1"])
+@pytest.mark.parametrize("names", ["capsule rock", "cylinder brick", "brick drum", "ellipsoid cylinder"])
+def test_shapes_with_one_centre_leave_each_other(names, tolerance):
+    model = model_of(np.random.default_rng(12), names, 0.001, f'ccd_tolerance="{tolerance}"')
+    offsets = np.array([0, 1e-17, 1e-15, 1e-12, 1e-6])
+    qpos = np.hstack([offsets[:, None], np.zeros((5, 2)), np.tile([1.0, 0, 0, 0], (5, 1))])
+    points, qacc = pair_points(model, qpos)
+    assert np.isfinite(qacc).all() and all(np.isfinite(row).all() for row in points)
+    # where the centres differ, there is a way out
+    assert all(len(row) for row in points[3:])
+
+
+def test_a_face_with_too_many_corners_has_own_points():
+    angles = np.linspace(0, 2 * np.pi, 600, endpoint=False)
+    disc = np.array([[0.1 * np.cos(a), 0.1 * np.sin(a), z] for z in (0, 0.02) for a in angles])
+    # a rounding of the vertices must not leave the plane
+    text = " ".join(f"{x:.9f}" for x in disc.ravel())
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.002"/><asset><mesh name="disc" vertex="{text}"/></asset><worldbody>
+        <geom type="box" size=".3 .3 .1" pos="0 0 -.1"/>
+        <body pos="0 0 .02"><freejoint/><geom type="mesh" mesh="disc"/></body></worldbody></mujoco>"""
+    )
+    with tl.launch(tl.Scene.from_mujoco(model), worlds=1, precision="f64", fields=("qpos", "contact_count")) as sim:
+        for _ in range(300):
+            frame = sim.step()
+        assert 3 <= frame.contact_count[0] <= 4
+        assert abs(frame.qpos[0, 3]) > 0.999
+
+
+def test_a_hull_beside_its_file_s_origin_meets_geoms(tmp_path):
+    # the middle of the box around it is outside, and so is the origin of its file
+    corners = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.3, 0], [0, 0, 0.3]]) + 1.0
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]
+    (tmp_path / "corner.obj").write_text("\n".join(lines))
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>
+        <geom type="ellipsoid" size=".1 .1 .08" mass="1"/></body></worldbody></mujoco>"""
+    )
+    scene = tl.Scene.from_mujoco(model)
+    scene.add_mesh(tmp_path / "corner.obj", pos=(-1, -1, -1), name="corner")
+    places = np.array([[0.3, 0.3, 0.3], [0.12, 0.12, 0.12], [0.1, 0.1, -0.05], [-0.05, 0.1, 0.1], [2, 2, 2]])
+    with tl.launch(scene, worlds=5, precision="f64", fields=("contact_count", "contact_distance")) as sim:
+        frame = sim.write(joint_q=np.hstack([places, np.tile([0, 0, 0, 1.0], (5, 1))]))
+        assert frame.contact_count.tolist() == [0, 1, 1, 1, 0]
+        # from below and from the side the depth is the radius along that axis less the distance
+        np.testing.assert_allclose(frame.contact_distance[[2, 3], 0], [0.05 - 0.08, 0.05 - 0.1], atol=1e-6)
 
 
 HEAP = ("box", "rock", "brick", "drum", "rock", "brick")

@@ -75,7 +75,7 @@ def test_forces_and_motion_are_mujocos(cone, condim, impratio):
         compare(case, 1e-8)
 
 
-@pytest.mark.parametrize("integrator", ["implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["implicitfast", "implicit", "RK4"])
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 def test_integrators_take_them(cone, integrator):
     with live(model(cone=cone, integrator=integrator), worlds=2, fields=FIELDS) as case:
@@ -99,18 +99,23 @@ def test_single_precision_is_near():
             assert relative(frame.qacc[world], data.qacc) < 1e-2
 
 
-def test_a_varied_friction_scales_both_tangents():
-    robot = model()
-    scales = np.array([0.5, 1.0, 1.7])
-    with live(robot, worlds=3, params=("pair_friction",)) as case:
+@pytest.mark.parametrize("option", ["", 'noslip_iterations="5"'])
+def test_friction_that_varies_scales_both_tangents_and_torques(option):
+    robot = model(option=option)
+    # of sliding, torsion and rolling
+    scales = np.array([[0.5, 1.0, 1.7], [1.0, 3.0, 0.4], [1.7, 0.5, 1.0]])
+    with live(robot, worlds=3, params=("pair_friction",), fields=FIELDS) as case:
         first = robot.pair_friction[:, [0, 2, 3]].copy()
-        case.sim.params.write(pair_friction=first * scales[:, None, None])
+        case.sim.params.write(pair_friction=first * scales[:, None])
         states = case.states(2, spread=0.0, speed=0.3)
         frame, before = case.place(states), robot.pair_friction.copy()
         for world, data in enumerate(case.data(states)):
-            robot.pair_friction[:] = before * scales[world]
+            robot.pair_friction[:] = before * scales[world, [0, 0, 1, 2, 2]]
             mujoco.mj_forward(robot, data)
+            mujoco.mj_rnePostConstraint(robot, data)
             assert relative(frame.qacc[world], data.qacc) < 1e-8
+            assert relative(frame.cfrc_ext[world].ravel(), data.cfrc_ext.ravel()) < 1e-8
+            assert relative(frame.sensordata[world], data.sensordata) < 1e-8
 
 
 def test_a_batch_takes_other_ratios_as_models_of_their_own():

@@ -54,7 +54,7 @@ def model(integrator: str = "implicitfast", flags: str = "", off: int = 0) -> mu
     ("flags", "off"),
     [("", 0), ('damper="disable"', 0), ('actuation="disable"', 0), ('eulerdamp="disable"', 0), ("", 1 << 2)],
 )
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit", "RK4"])
 def test_forces_and_steps_are_mujocos(integrator, flags, off):
     with live(model(integrator, flags, off), worlds=WORLDS, fields=FIELDS) as case:
         states = case.states(3, spread=0.3, speed=1.0)

@@ -56,7 +56,7 @@ def model(motor: str, integrator: str = "implicitfast") -> mujoco.MjModel:
 
 @pytest.mark.parametrize("off", [0, 1 << 2])
 @pytest.mark.parametrize("motor", MOTORS)
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit", "RK4"])
 def test_forces_currents_and_steps_are_mujocos(integrator, motor, off):
     robot = model(MOTORS[motor], integrator)
     robot.opt.disableactuator = off
