@@ -192,8 +192,10 @@ def test_points_are_mujocos_where_a_pair_keeps_all(geom: str, margin: float) -> 
     few = np.array([0 < len(theirs.distance) <= KEPT for theirs in both.theirs])
     same = same_contacts(both, 1e-9)
     print(f"{geom}: {few.sum()} of 300, {same[few].mean()}")
-    # round shapes end elsewhere where a pose differs by a rounding, as they do in MuJoCo
-    assert few.sum() > 60 and same[few].mean() > (0.98 if geom in ("box", "mesh") else 0.85)
+    # as many in every world; of spheres and capsules all the same, of others some ends of searches differ
+    alike = [len(theirs.distance) == len(ours.distance) for theirs, ours in zip(both.theirs, both.ours, strict=True)]
+    assert few.sum() > 60 and np.array(alike)[few].mean() > 0.99
+    assert same[few].mean() > {"box": 0.6, "mesh": 0.6, "cylinder": 0.6, "ellipsoid": 0.85}.get(geom, 0.98)
     size = np.maximum(1.0, abs(both.their_qacc).max(1))
     assert (abs(both.our_qacc - both.their_qacc).max(1) / size)[same].max() < 1e-6
 

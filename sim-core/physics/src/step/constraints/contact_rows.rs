@@ -179,9 +179,19 @@ impl<'a, C: Cx> Contact<'a, C> {
     #[inline(always)]
     fn write_turning(&self, cx: &mut C, b: &BlockOf<C>, block: usize) {
         let (t, zero, one) = (self.t, C::F::c(0.0), C::F::c(1.0));
-        // a pair without friction has no such rows
-        let scales = turning_scales(cx, t, self.row, self.pair).0;
-        let scales = scales.map(|scale| scale * self.rubs);
+        // friction of torsion and of rolling over that of sliding
+        let mut ratios = [zero; 2];
+        for (k, scaled) in ratios.iter_mut().enumerate() {
+            let mut ratio = cx.pick(t.turning, self.pair, k);
+            // where it varies, a ratio above 0 only says that the pair has this friction
+            if t.varying.turning {
+                let varied = cx.load(t.memory.rows, self.row, row::VARYING + k);
+                ratio = C::F::select(zero.lt(ratio), varied, zero);
+            }
+            *scaled = ratio * self.rubs;
+        }
+        let [twist, roll] = ratios;
+        let scales = [twist, roll, second_roll(cx, t, self.pair, roll)];
         let mut velocity = [zero; 3];
         // J(i, dof) = ± scale (axis · ω)
         for (c, column) in self.class.columns.iter().enumerate() {
@@ -320,30 +330,30 @@ impl<'a, C: Cx> Contact<'a, C> {
     }
 }
 
-/// Torsional friction and rolling friction about both tangents over that of sliding: what scales the torques of contact `r`.
+/// Torsional friction and rolling friction about both tangents over that of sliding, as the model has them: what scales the torques
+/// of a contact.
 #[inline(always)]
 pub(in crate::step) fn turning_scales<C: Cx>(
     cx: &mut C,
     t: &Contacts<<C::F as Num>::Real>,
-    r: C::I,
     pair: C::F,
 ) -> Vec3<C::F> {
-    let zero = C::F::c(0.0);
-    let mut ratios = [zero; 2];
-    for (k, scaled) in ratios.iter_mut().enumerate() {
-        *scaled = cx.pick(t.turning, pair, k);
-        // where it varies, a ratio above 0 only says that the pair has this friction
-        if t.varying.turning {
-            let varied = cx.load(t.memory.rows, r, row::VARYING + k);
-            *scaled = C::F::select(zero.lt(*scaled), varied, zero);
-        }
-    }
-    let [twist, roll] = ratios;
-    let second = match t.skew.rows > 0 {
+    let (twist, roll) = (cx.pick(t.turning, pair, 0), cx.pick(t.turning, pair, 1));
+    Vec3([twist, roll, second_roll(cx, t, pair, roll)])
+}
+
+/// What scales rotations about the second tangent, from what scales those about the first.
+#[inline(always)]
+fn second_roll<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    pair: C::F,
+    roll: C::F,
+) -> C::F {
+    match t.skew.rows > 0 {
         true => roll * cx.pick(t.skew, pair, skew::ROLL),
         false => roll,
-    };
-    Vec3([twist, roll, second])
+    }
 }
 
 /// d(r) of a kind of contacts, of which the power alone counts where the rest varies.

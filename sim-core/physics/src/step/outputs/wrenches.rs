@@ -263,7 +263,7 @@ fn contact_force<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, number: usize, r: C::I) 
     if let Some(block) = t.classes[number].turns {
         let pair = cx.load(rows, r, row::PAIR);
         let Vec3([x, y, z]) = load_vec3(cx, rows, r, block + turning::FORCE);
-        let Vec3([twist, first, second]) = turning_scales(cx, t, r, pair);
+        let Vec3([twist, first, second]) = turning_scales(cx, t, pair);
         torque = frame.mul_add(Vec3([x * twist, y * first, z * second]), Vec3::zero());
     }
     [point, frame.mul_add(force, Vec3::zero()), torque]

@@ -197,23 +197,37 @@ fn collide_field<C: Cx, N: FieldNarrow>(cx: &mut C, t: &Contacts<<C::F as Num>::
         each!(cx, at in listed, {
             let number = cx.load(table, at, 0);
             let prism = samples.prism(cx, &cells, number, size);
-            // in double precision, models from MuJoCo have its points
-            let is_reference = <<C::F as Num>::Real as Real>::DOUBLE && t.reference.is_used;
-            let placed = (&axes, &prism);
-            if !is_reference
-                || !reference_prism(cx, N::KIND, &shapes, placed, &mut candidate_points)
-            {
-                N::contacts(cx, &shapes, &axes, &prism, &mut candidate_points);
-            }
+            let placed = (&axes, &prism, samples.lowest());
+            touch::<C, N>(cx, &shapes, placed, &mut candidate_points);
         });
         // prisms and candidates beyond their lists count as contacts left out
-        let (none, full) = (C::F::c(0.0), C::F::c(FIELD_CANDIDATES as f64));
-        let prisms = (cx.pushed(&listed) - full).max(none);
-        let over = prisms + (cx.pushed(&candidate_points.list) - full).max(none);
+        let over = beyond::<C>(cx, &listed) + beyond::<C>(cx, &candidate_points.list);
         out.room.leave_out(cx, over);
         // step 5: all candidates, or those that span most
         keep(cx, &candidate_points, size, &mut out);
     });
+}
+
+/// How many rows a list has no room for.
+#[inline(always)]
+fn beyond<C: Cx>(cx: &mut C, list: &C::List) -> C::F {
+    (cx.pushed(list) - C::F::c(FIELD_CANDIDATES as f64)).max(C::F::c(0.0))
+}
+
+/// Adds the contacts of a shape with these axes and a prism, in a field with this bottom.
+#[inline(always)]
+fn touch<C: Cx, N: FieldNarrow>(
+    cx: &mut C,
+    shapes: &ShapePair<'_, C>,
+    (axes, prism, bottom): (&Mat3<C::F>, &Prism<C::F>, C::F),
+    out: &mut Points<C>,
+) {
+    // in double precision, models from MuJoCo have its points
+    let is_reference = <<C::F as Num>::Real as Real>::DOUBLE && shapes.reference.is_used;
+    if is_reference && reference_prism(cx, N::KIND, shapes, (axes, prism, bottom), out) {
+        return;
+    }
+    N::contacts(cx, shapes, axes, prism, out);
 }
 
 /// Lists the prisms that a shape may touch. `ground` has the samples, the cells under the shape, and a bound of its radius.

@@ -80,13 +80,13 @@ pub fn reference_contacts<C: Cx>(
 }
 
 /// Adds the contact of a shape of this kind, the first of the pair, and a prism of a height field, whose axes are those of the
-/// second. `axes` are the shape's in these (MuJoCo: `mjc_ConvexHField`).
+/// second. `axes` are the shape's in these, and `bottom` is the height of the field's (MuJoCo: `mjc_ConvexHField`).
 #[inline(always)]
 pub fn reference_prism<C: Cx>(
     cx: &mut C,
     kind: Kind,
     pair: &ShapePair<'_, C>,
-    (axes, prism): (&Mat3<C::F>, &Prism<C::F>),
+    (axes, prism, bottom): (&Mat3<C::F>, &Prism<C::F>, C::F),
     out: &mut Points<C>,
 ) -> bool {
     // the centre of the shape is the origin
@@ -101,7 +101,7 @@ pub fn reference_prism<C: Cx>(
         false => [p, q, k],
     };
     let top = top.map(|corner| corner.0.map(|x| cx.reference(x)));
-    let bottom = cx.reference(prism.bottom);
+    let bottom = cx.reference(bottom);
     let margin = cx.reference(pair.reach);
     // a prism touches in one point
     let limits = Limits {

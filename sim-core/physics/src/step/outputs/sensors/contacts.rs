@@ -109,7 +109,7 @@ fn contact<C: Cx>(
     // torsional and rolling rows are scaled by their friction over that of sliding, so a torque is too
     if let Some(block) = t.classes[class].turns {
         let Vec3([x, y, z]) = load_vec3(cx, rows, r, block + turning::FORCE);
-        let Vec3([twist, first, second]) = turning_scales(cx, t, r, pair);
+        let Vec3([twist, first, second]) = turning_scales(cx, t, pair);
         torque = Vec3([x * twist, y * first, z * second]);
     }
     // rows have points from the reference point of the second tree

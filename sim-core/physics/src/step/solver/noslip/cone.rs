@@ -121,13 +121,13 @@ pub(super) fn squares<C: Cx>(cx: &mut C, t: &ContactsOf<C>, class: &ClassOf<C>, 
     normal.fma(normal, sum * ratio)
 }
 
-/// Friction of a direction over that of the first tangent.
+/// Friction of a direction over that of the first tangent, as the model has it.
 #[inline(always)]
 fn ratio<C: Cx>(cx: &mut C, t: &ContactsOf<C>, r: C::I, direction: usize) -> C::F {
     let pair = cx.load(t.memory.rows, r, row::PAIR);
     let mut ratio = match direction {
         0 | 1 => C::F::c(1.0),
-        _ => turning_scales(cx, t, r, pair)[direction - 2],
+        _ => turning_scales(cx, t, pair)[direction - 2],
     };
     // a second tangent that is scaled scales rotations about it, too
     if t.skew.rows > 0 && matches!(direction, 1 | 4) {
