@@ -29,7 +29,30 @@ pub struct GeomContact {
     pub gap: f64,
 }
 
+/// Contact parameters that take the place of those of all geoms and pairs of a model (MuJoCo: the flag `override`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactOverride {
+    /// Softness, also of friction.
+    pub softness: Softness,
+    /// Sliding friction along the first tangent, torsional friction, and rolling friction about the first tangent [–, m, m].
+    pub friction: [f64; 3],
+    /// Sliding friction along the second tangent, and rolling friction about it [–, m].
+    pub second: [f64; 2],
+    /// Distance at which a contact acts [m]; gaps stay those of geoms and pairs.
+    pub margin: f64,
+}
+
 impl GeomContact {
+    /// The parameters of a contact that a model overrides: only the dimensions and the gap are its own.
+    pub(crate) fn overridden(self, by: &ContactOverride) -> GeomContact {
+        GeomContact {
+            softness: by.softness,
+            friction: by.friction,
+            margin: by.margin,
+            ..self
+        }
+    }
+
     /// A surface of ours as a geom, for contacts with one: its stiffness and damping as `solref`, and MuJoCo's defaults.
     pub(crate) fn from_surface(surface: &Surface) -> GeomContact {
         let bits = u32::from(surface.group != 0);

@@ -52,7 +52,7 @@ pub use description::{
 };
 pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;
-pub use geom_contact::GeomContact;
+pub use geom_contact::{ContactOverride, GeomContact};
 pub use geometry::Shape;
 pub use inertia::{Inertial, principal_moments};
 pub use joint_kind::JointKind;

@@ -40,7 +40,7 @@ MODEL = {
 #: Parts of `MjOption` that are not read.
 OPTIONS = {
     "of MuJoCo's numerical methods": "jacobian sdf_*",
-    "refused with the flag for override": "o_*",
+    "read with the flag for override": "o_*",
     "refused with the flag for sleep": "sleep_tolerance",
 }
 #: Options that the file has by other names: enumerations and flags.

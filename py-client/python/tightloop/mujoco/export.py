@@ -108,6 +108,8 @@ _REAL_OPTIONS = (
     *("timestep", "gravity", "tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
     *("density", "viscosity", "wind", "magnetic"),
 )
+#: Options that count where the flag ``mjENBL_OVERRIDE`` is set.
+_OVERRIDE_OPTIONS = ("o_margin", "o_solref", "o_solimp", "o_friction")
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "disableactuator")
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor", "nsensordata")
 
@@ -186,7 +188,8 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     found["names.model"] = as_bytes([text[: text.index(b"\0")].decode(errors="replace")])
     found |= _hulls(model)
     found["mat_texture_mean"] = textures.means(model)
-    for name in _REAL_OPTIONS:
+    overrides = _OVERRIDE_OPTIONS if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE else ()
+    for name in (*_REAL_OPTIONS, *overrides):
         found[f"opt.{name}"] = np.array(getattr(model.opt, name), np.float64).reshape(-1)
     for name in _COUNT_OPTIONS:
         found[f"opt.{name}"] = np.array([getattr(model.opt, name)], np.int32)

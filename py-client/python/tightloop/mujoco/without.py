@@ -16,7 +16,7 @@ Arrays = dict[str, NDArray[Any]]
 #: Where a file keeps what was left out, a sentence each; `sim-core/model/src/mujoco` adds them to the model's notes.
 NOTES = "notes.without"
 #: Enabled parts that are supported; all that can be disabled is.
-_FLAGS = ("mjENBL_ENERGY", "mjENBL_FWDINV")
+_FLAGS = ("mjENBL_ENERGY", "mjENBL_FWDINV", "mjENBL_OVERRIDE")
 #: Largest power of ``solimp``, as `sim-core/model/src/softness.rs` has it, and its place.
 _POWER_MAX, _POWER = 16.0, 4
 #: Integrators that every device has. A GPU has no ``mjINT_IMPLICIT``, so that a model may be made without it.

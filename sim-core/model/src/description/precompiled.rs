@@ -4,7 +4,7 @@ use super::constraints::{Constraint, Tendon};
 use super::output_frames::FrameParts;
 use super::sensors::SensorParts;
 use super::tendons::SpatialTendon;
-use crate::geom_contact::GeomContact;
+use crate::geom_contact::{ContactOverride, GeomContact};
 use crate::pose::Pose;
 use crate::softness::Softness;
 use sim_physics::constants::actuators::{ActivationRate, Motor, Muscle};
@@ -52,6 +52,8 @@ pub struct Precompiled {
     pub excludes: Vec<[usize; 2]>,
     /// Pairs of geoms that touch by rules of their own.
     pub pairs: Vec<ContactPair>,
+    /// What contacts between its geoms have in place of their own parameters, if anything.
+    pub contact_override: Option<ContactOverride>,
     /// Whether a link touches its parent.
     pub touches_parent: bool,
     /// How a step integrates velocities.

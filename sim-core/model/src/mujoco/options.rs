@@ -3,9 +3,14 @@
 use super::format::ModelFile;
 use crate::description::{Description, Solver};
 use crate::error::ModelError;
+use crate::geom_contact::ContactOverride;
 use crate::pose::Pose;
+use crate::softness::Softness;
 use sim_physics::constants::contact::Cone;
 use sim_physics::constants::options::Integrator;
+
+/// The flag by which all contacts have the parameters of `<option>`.
+pub(super) const OVERRIDE: &str = "mjENBL_OVERRIDE";
 
 /// How a model is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +40,24 @@ impl MujocoOptions {
 /// Is this flag of `option/flag` set against its default? Flags that disable begin with `mjDSBL_`.
 pub(super) fn has_flag(file: &ModelFile, flag: &str) -> Result<bool, ModelError> {
     Ok(file.texts("opt.flags")?.iter().any(|set| set == flag))
+}
+
+/// What all contacts of a model have in place of their own parameters (MuJoCo: `o_margin`, `o_solref`, `o_solimp` and
+/// `o_friction`).
+pub(super) fn contact_override(file: &ModelFile) -> Result<Option<ContactOverride>, ModelError> {
+    if !has_flag(file, OVERRIDE)? {
+        return Ok(None);
+    }
+    let [slide, across, twist, roll, roll_across] = file.vectors("opt.o_friction", 1)?[0];
+    Ok(Some(ContactOverride {
+        softness: Softness {
+            solref: file.vectors("opt.o_solref", 1)?[0],
+            solimp: file.vectors("opt.o_solimp", 1)?[0],
+        },
+        friction: [slide, twist, roll],
+        second: [across, roll_across],
+        margin: file.real("opt.o_margin")?,
+    }))
 }
 
 /// The integrator. Refusals have named the others.

@@ -5,7 +5,7 @@ use super::actuators::motors::Motors;
 use super::actuators::muscles::Muscles;
 use super::format::ModelFile;
 use super::names::names;
-use super::options::has_flag;
+use super::options::{OVERRIDE, contact_override, has_flag};
 use super::pairs;
 use super::reflected::{self, Driven};
 use crate::error::ModelError;
@@ -26,6 +26,7 @@ const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
 const FLAGS: &[&str] = &[
     "mjENBL_ENERGY",
     "mjENBL_FWDINV",
+    OVERRIDE,
     "mjDSBL_CONSTRAINT",
     "mjDSBL_EQUALITY",
     "mjDSBL_FRICTIONLOSS",
@@ -106,6 +107,12 @@ fn options(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelError
             "option `integrator`: no support for {}, use Euler, implicit, implicitfast or RK4",
             other.unwrap_or("none")
         )),
+    }
+    if let Some(contact) = contact_override(file)? {
+        refuse_power(refused, "option", "o_solimp", &contact.softness.solimp);
+        if contact.margin < 0.0 {
+            refused.push(no("option", "o_margin", "a negative margin"));
+        }
     }
     for (counted, what) in [("nflex", "flexes"), ("nplugin", "plugins")] {
         if file.integer(counted)? > 0 {

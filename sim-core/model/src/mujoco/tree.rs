@@ -5,7 +5,7 @@ use super::format::ModelFile;
 use super::frame;
 use super::frames;
 use super::names::names;
-use super::options::{MujocoOptions, has_flag, integrator};
+use super::options::{MujocoOptions, contact_override, has_flag, integrator};
 use super::reflected::{self, Driven, Share};
 use super::{passive, tendons};
 use crate::description::{
@@ -121,6 +121,7 @@ fn parts(
         parents: parents.iter().map(|parent| parent.unwrap_or(0)).collect(),
         excludes: excludes.collect(),
         pairs: Vec::new(),
+        contact_override: contact_override(file)?,
         touches_parent: has_flag(file, "mjDSBL_FILTERPARENT")?,
         integrator: integrator(file)?,
         ls_tolerance: file.real_or("opt.ls_tolerance", LS_TOLERANCE)?,

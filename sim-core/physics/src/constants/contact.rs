@@ -190,6 +190,8 @@ pub mod rule {
     pub const SECOND: f64 = 3.0;
     /// The pair's own.
     pub const OWN: f64 = 4.0;
+    /// That of the model, in all worlds.
+    pub const FIXED: f64 = 5.0;
 }
 
 recast! {

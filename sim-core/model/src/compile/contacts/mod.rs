@@ -296,6 +296,9 @@ impl ContactBuilder<'_> {
         if self.geom_pair(a, b).is_none() {
             return rule::COMBINED;
         }
+        if self.is_overridden(a, b) {
+            return rule::FIXED;
+        }
         if named_pair(a, b, self.rules).is_some() {
             return rule::OWN;
         }

@@ -2,7 +2,7 @@
 
 use super::super::constraint_rows::{IMPEDANCE, contact_damping};
 use super::clusters::Cluster;
-use super::pieces::{Piece, PlacedShape, Rules, geom_of, named_pair};
+use super::pieces::{Piece, PlacedShape, Rules, geom_of, named_pair, overriding};
 use crate::description::Description;
 use crate::geom_contact::GeomContact;
 use crate::softness::Softness;
@@ -112,7 +112,8 @@ impl ContactBuilder<'_> {
             let (stiffness, damping) = geom.softness.reference(self.scene.dt, is_safe);
             row[pair::STIFFNESS] = stiffness;
             row[pair::DAMPING] = damping;
-            let sliding = named_pair(x, y, self.rules).and_then(|pair| pair.sliding);
+            let named = named_pair(x, y, self.rules).filter(|_| !self.is_overridden(x, y));
+            let sliding = named.and_then(|pair| pair.sliding);
             let sliding = sliding.map(|solref| Softness {
                 solref,
                 ..geom.softness
@@ -148,10 +149,20 @@ impl ContactBuilder<'_> {
         x: &PlacedShape<'_>,
         y: &PlacedShape<'_>,
     ) -> Option<GeomContact> {
-        if let Some(pair) = named_pair(x, y, self.rules) {
-            return Some(pair.contact);
-        }
-        (x.geom.is_some() || y.geom.is_some()).then(|| geom_of(x).combined(&geom_of(y)))
+        let own = match named_pair(x, y, self.rules) {
+            Some(pair) => pair.contact,
+            None if x.geom.is_some() || y.geom.is_some() => geom_of(x).combined(&geom_of(y)),
+            None => return None,
+        };
+        Some(match overriding(x, y, self.rules) {
+            Some(by) => own.overridden(by),
+            None => own,
+        })
+    }
+
+    /// Whether the contacts of two geoms have none of their own parameters.
+    pub(super) fn is_overridden(&self, x: &PlacedShape<'_>, y: &PlacedShape<'_>) -> bool {
+        overriding(x, y, self.rules).is_some()
     }
 
     /// Torsional and rolling friction of a pair over its sliding friction.
@@ -185,18 +196,21 @@ impl ContactBuilder<'_> {
     /// How the friction of a pair differs between the tangents, by the columns of its table.
     pub(super) fn skew(&self, (a, b): (usize, usize)) -> [f64; skew::COLUMNS] {
         let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
-        let Some(pair) = named_pair(x, y, self.rules) else {
+        let of_model = overriding(x, y, self.rules).map(|by| by.second);
+        let of_pair = named_pair(x, y, self.rules).map(|pair| pair.second);
+        let (Some([second, about_second]), Some(contact)) =
+            (of_model.or(of_pair), self.geom_pair(x, y))
+        else {
             return [1.0; skew::COLUMNS];
         };
         // friction over friction, as MuJoCo bounds both
         let over = |second: f64, first: f64| second.max(MU_MIN) / first.max(MU_MIN);
-        let [first, _, about_first] = pair.contact.friction;
-        let [second, about_second] = pair.second;
-        let slide = match pair.contact.condim {
+        let [first, _, about_first] = contact.friction;
+        let slide = match contact.condim {
             1 => 1.0,
             _ => over(second, first),
         };
-        let roll = match pair.contact.condim {
+        let roll = match contact.condim {
             6 => over(about_second, about_first),
             _ => 1.0,
         };

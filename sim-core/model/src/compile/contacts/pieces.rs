@@ -5,7 +5,7 @@ use super::super::inverse_weight::Reference;
 use super::reference;
 use crate::description::{ContactPair, Description, Joint, Precompiled, Robot};
 use crate::error::ModelError;
-use crate::geom_contact::GeomContact;
+use crate::geom_contact::{ContactOverride, GeomContact};
 use crate::geometry::{Hull, Shape};
 use crate::hull_tables;
 use crate::joint_kind::JointKind;
@@ -417,6 +417,16 @@ pub(super) fn named_pair<'a>(
     rules: &Rules<'a>,
 ) -> Option<&'a ContactPair> {
     rules.pairs().nth(named_pair_place(a, b, rules)?)
+}
+
+/// What the model of two geoms gives their contacts in place of their own parameters.
+pub(super) fn overriding<'a>(
+    a: &PlacedShape<'_>,
+    b: &PlacedShape<'_>,
+    rules: &Rules<'a>,
+) -> Option<&'a ContactOverride> {
+    let robot = a.robot.filter(|_| a.robot == b.robot)?;
+    rules.precompiled[robot]?.contact_override.as_ref()
 }
 
 /// Place of two geoms among the pairs that models name.

@@ -100,6 +100,11 @@ pub(super) fn friction<C: Cx>(
             mu = C::F::select(is_at_least(rule::SECOND), b, mu);
             let of_pair = friction_of_pair(cx, t, p, column);
             mu = C::F::select(is_at_least(rule::OWN), of_pair, mu);
+            // beside pairs whose own friction varies, others have that of their model
+            if t.varying.pairs {
+                let fixed = fixed_friction(cx, t, p, column);
+                mu = C::F::select(is_at_least(rule::FIXED), fixed, mu);
+            }
         }
     }
     mu.max(C::F::c(MU_MIN))
@@ -117,6 +122,17 @@ fn friction_of_pair<C: Cx>(
         let row = cx.index(t.named_pairs, p, 0, t.memory.mu.rows);
         return cx.load(t.memory.mu, row, column);
     }
+    fixed_friction(cx, t, p, column)
+}
+
+/// Coefficient of friction of a pair that is the same in all worlds.
+#[inline(always)]
+fn fixed_friction<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+    column: usize,
+) -> C::F {
     let mu = cx.constant(t.handles.pair_numbers, p, pair::MU);
     match column != surface::MU && t.turning.rows > 0 {
         true => mu * cx.constant(t.turning, p, column - surface::TORSION),
