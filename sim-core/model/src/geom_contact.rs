@@ -27,6 +27,8 @@ pub struct GeomContact {
     pub margin: f64,
     /// Extra distance at which a contact is listed [m]; those of two geoms are added.
     pub gap: f64,
+    /// How its surface moves beside it, in its frame: velocity at its origin, then angular velocity [m/s, rad/s]; none of a pair.
+    pub surface_velocity: [f64; 6],
 }
 
 /// Contact parameters that take the place of those of all geoms and pairs of a model (MuJoCo: the flag `override`).
@@ -69,6 +71,7 @@ impl GeomContact {
             friction: [surface.mu, 0.005, 0.0001],
             margin: surface.margin,
             gap: surface.gap,
+            surface_velocity: [0.0; 6],
         }
     }
 

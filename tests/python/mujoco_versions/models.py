@@ -165,6 +165,7 @@ class Model:
 
 _OVERRIDE = """<option o_margin=".003" o_solref=".03 .8" o_solimp=".8 .9 .01 .5 2" o_friction=".4 .4 .02 .001 .001">
   <flag override="enable"/></option><worldbody>"""
+_BELT = 'size="5 5 .1" surfacevel=".3 -.2 0 0 0 .5"'
 # The machine's joint never reaches the first range and does reach the second.
 WIDE, NARROW = "-200 200", "-2 2"
 # Without contacts, rounding is what differs. Contacts amplify it by the stiffness of their rows.
@@ -198,6 +199,7 @@ MODELS = {
     "at-rest": Model(AT_REST, 1e-8, 20),
     "heap": Model(HEAP.format(cone="pyramidal"), 1e-6, 40),
     "heap-elliptic": Model(HEAP.format(cone="elliptic"), 1e-6, 40),
+    "heap-belt": Model(HEAP.format(cone="elliptic").replace('size="5 5 .1"', _BELT, 1), 1e-6, 40),
     "heap-override": Model(HEAP.format(cone="elliptic").replace("<worldbody>", _OVERRIDE, 1), 1e-6, 40),
 }
 
@@ -224,11 +226,6 @@ class Refused:
 REFUSED = {
     "adhesion": Refused(
         (3, 11), _FALL.format('<geom name="glue" size=".1" adhesion="1"/>'), "geom `glue`: no support for adhesion"
-    ),
-    "surface velocity": Refused(
-        (3, 11),
-        _FALL.format('<geom name="belt" size=".1" surfacevel="1 0 0 0 0 0"/>'),
-        "geom `belt`: no support for surface velocity",
     ),
     "DC motors": Refused(
         (3, 11),

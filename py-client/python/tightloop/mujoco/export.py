@@ -169,6 +169,9 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     for name in _NEWER_ARRAYS:
         if hasattr(model, name):
             found[name] = _plain(getattr(model, name))
+    # MuJoCo ignores surface velocities that were set later without this flag
+    if not getattr(model, "flg_surfacevel", True):
+        found["geom_surfacevel"][:] = 0
     shared_frames.apply(model, found)
     for name, kind in _KINDS.items():
         members = {int(value): key for key, value in getattr(mujoco, kind).__members__.items()}

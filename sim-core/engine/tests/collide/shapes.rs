@@ -209,6 +209,7 @@ pub fn contacts_of_geoms(machine: Machine, pairs: &[Pair], margin: f64) -> Vec<V
         friction: [1.0, 0.005, 0.0001],
         margin: 0.0,
         gap: 0.0,
+        surface_velocity: [0.0; 6],
     };
     contacts_of(machine, &[], pairs, margin, Some(geom))
 }

@@ -115,6 +115,10 @@ fn contacts(file: &ModelFile, count: usize) -> Result<Vec<GeomContact>, ModelErr
     let frictions = file.vectors::<3>("geom_friction", count)?;
     let margins = file.reals("geom_margin", count)?;
     let gaps = file.reals("geom_gap", count)?;
+    let surface_velocities = match file.has("geom_surfacevel") {
+        true => file.vectors::<6>("geom_surfacevel", count)?,
+        false => vec![[0.0; 6]; count],
+    };
     let all = (0..count).map(|k| GeomContact {
         contype: contypes[k] as u32,
         conaffinity: conaffinities[k] as u32,
@@ -125,6 +129,7 @@ fn contacts(file: &ModelFile, count: usize) -> Result<Vec<GeomContact>, ModelErr
         friction: frictions[k],
         margin: margins[k],
         gap: gaps[k],
+        surface_velocity: surface_velocities[k],
     });
     Ok(all.collect())
 }

@@ -72,6 +72,7 @@ pub(super) fn add_pairs(
                 friction: [slide, twist, roll],
                 margin: margins[k],
                 gap: gaps[k],
+                surface_velocity: [0.0; 6],
             },
             second: [across, roll_across],
             sliding: (sliding[k] != [0.0; 2]).then_some(sliding[k]),

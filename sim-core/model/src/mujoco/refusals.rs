@@ -17,7 +17,6 @@ const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("pair", "pair_adhesion", "adhesion"),
     ("joint", "jnt_springyield", "plastic springs"),
     ("geom", "geom_adhesion", "adhesion"),
-    ("geom", "geom_surfacevel", "surface velocity"),
     ("tendon", "tendon_springyield", "plastic springs"),
     ("actuator", "actuator_delay", "a delay"),
 ];

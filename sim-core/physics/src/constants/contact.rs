@@ -60,6 +60,8 @@ recast! {
         pub turning: Fixed,
         /// How friction differs between the tangents of each pair ([`skew`]); without rows where it differs in none.
         pub skew: Fixed,
+        /// How the surfaces of each pair's shapes move beside the shapes ([`surface_velocity`]); without rows where none does.
+        pub surface_velocities: Fixed,
         /// How the friction of two shapes combines.
         pub combine: FrictionCombine,
         /// Of each pair, which friction counts ([`rule`]); without rows where all combine, or all have the larger one.
@@ -176,6 +178,14 @@ pub mod skew {
     pub const ROLL: usize = 1;
     /// Columns.
     pub const COLUMNS: usize = 2;
+}
+
+/// Columns of the table of pairs whose surfaces move beside their shapes, as belts do.
+pub mod surface_velocity {
+    /// Of one shape: velocity at its centre [m/s], then angular velocity [rad/s], in its axes.
+    pub const OF_SHAPE: usize = 6;
+    /// Columns: those of the first, then of the second shape.
+    pub const COLUMNS: usize = 2 * OF_SHAPE;
 }
 
 /// Which friction of two shapes counts for a pair, where it varies.
@@ -498,6 +508,10 @@ pub mod row {
     pub const TANGENTS: usize = 22;
     /// Stiffness of an elliptic cone's contact that slides, along its own slope [kg].
     pub const SOFT: usize = 28;
+    /// Until the rows are written: velocity of the second surface relative to the first, beside that of the bodies (3) [m/s].
+    pub const SURFACE_VELOCITY: usize = SOFT;
+    /// And its angular velocity along the normal [rad/s].
+    pub const SURFACE_SPIN: usize = SURFACE_VELOCITY + 3;
     /// Of an iteration of the solver: which piece of its cost the contact is on.
     pub const STATE: usize = 29;
     /// Of a line search: force times the change of `AHEAD` [N·m/s²].
@@ -598,6 +612,7 @@ impl<R: Real> Contacts<R> {
             },
             turning: Fixed::default(),
             skew: Fixed::default(),
+            surface_velocities: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
             has_rules: false,

@@ -7,6 +7,7 @@ mod pairs;
 pub(super) mod pieces;
 mod reference;
 pub(super) mod sensors;
+mod surface_velocities;
 mod varying;
 
 use crate::description::Description;
@@ -14,7 +15,7 @@ use crate::error::ModelError;
 use clusters::clusters;
 use fields::add_fields;
 use pairs::ContactBuilder;
-use pieces::{PlacedShape, Rules, contacts_of, named_pair, pairs, pieces};
+use pieces::{PlacedShape, Rules, contacts_of, pairs, pieces};
 use sensors::add_touched_bodies;
 use sim_physics::constants::contact::{
     Class, Column, Cone, Contacts, FrictionCombine, Kind, Pair, PairImpedances, Run,
@@ -26,7 +27,6 @@ use sim_physics::constants::{Constants, Coupled, Impedance};
 use sim_physics::lane::Fixed;
 use sim_physics::math::factor::{Pattern, UpdatePath};
 use sim_physics::step::constraints::contact_rows::{EDGES_MAX, edge_stiffness};
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Stiffness of a contact over the mass of what it moves, above which single precision may lose that mass in their sum [–]. Levers
@@ -163,6 +163,7 @@ impl ContactBuilder<'_> {
         self.add_combine(contacts, pairs);
         self.add_mixing(contacts, pairs);
         self.add_named_pairs(contacts, pairs);
+        self.add_surface_velocities(contacts, pairs);
         contacts.two_point_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
         contacts.are_stiff = self.are_stiff(pairs, &mu);
         let coupled = self.coupled(contacts);
@@ -288,26 +289,6 @@ impl ContactBuilder<'_> {
             rows: pairs.len(),
         };
         contacts.tables.numbers.extend(rules);
-    }
-
-    /// Whose friction counts for a pair: MuJoCo's rule for its geoms, that of the scene for others.
-    pub(super) fn friction_rule(&self, (a, b): (usize, usize)) -> f64 {
-        let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
-        if self.geom_pair(a, b).is_none() {
-            return rule::COMBINED;
-        }
-        if self.is_overridden(a, b) {
-            return rule::FIXED;
-        }
-        if named_pair(a, b, self.rules).is_some() {
-            return rule::OWN;
-        }
-        let [first, second] = [a, b].map(PlacedShape::priority);
-        match first.cmp(&second) {
-            Ordering::Equal => rule::LARGER,
-            Ordering::Greater => rule::FIRST,
-            Ordering::Less => rule::SECOND,
-        }
     }
 
     /// Whether a pair is of a capsule and a box, one of which is a geom of MuJoCo's.

@@ -1,10 +1,11 @@
 //! Tables of pairs that the kernel source reads where surfaces differ from world to world.
 
 use super::pairs::ContactBuilder;
-use super::pieces::{geom_of, named_pair_place};
+use super::pieces::{PlacedShape, geom_of, named_pair, named_pair_place};
 use sim_physics::constants::Impedance;
-use sim_physics::constants::contact::{Contacts, mixing};
+use sim_physics::constants::contact::{Contacts, mixing, rule};
 use sim_physics::lane::Fixed;
+use std::cmp::Ordering;
 
 impl ContactBuilder<'_> {
     /// Notes of each pair how the softness of its shapes combines.
@@ -59,5 +60,25 @@ impl ContactBuilder<'_> {
             u32::try_from(row).expect("models have fewer pairs than that")
         });
         contacts.tables.indices.extend(rows);
+    }
+
+    /// Whose friction counts for a pair: MuJoCo's rule for its geoms, that of the scene for others.
+    pub(super) fn friction_rule(&self, (a, b): (usize, usize)) -> f64 {
+        let [a, b] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        if self.geom_pair(a, b).is_none() {
+            return rule::COMBINED;
+        }
+        if self.is_overridden(a, b) {
+            return rule::FIXED;
+        }
+        if named_pair(a, b, self.rules).is_some() {
+            return rule::OWN;
+        }
+        let [first, second] = [a, b].map(PlacedShape::priority);
+        match first.cmp(&second) {
+            Ordering::Equal => rule::LARGER,
+            Ordering::Greater => rule::FIRST,
+            Ordering::Less => rule::SECOND,
+        }
     }
 }

@@ -46,7 +46,7 @@ pub use height_field::fields::{
 };
 use manifold::points::{Points, Room};
 pub use narrow::*;
-use surfaces::{friction, place_pairs, place_surface, softness, varying};
+use surfaces::{friction, place_pairs, place_surface, softness, surface_motion, varying};
 
 /// Poses of shapes.
 pub struct Place;
@@ -389,6 +389,7 @@ fn points_of<C: Cx>(
         mu,
         varying: varying(cx, t, p, mu),
         softness: softness(cx, t, p),
+        surface_motion: surface_motion(cx, t, p),
         // the forces of a pyramidal cone depend on the tangents' direction, as does friction that differs between them
         along: t.has_directions().then_some(Vec3([C::F::c(0.0); 3])),
         room: Room {

@@ -3,12 +3,14 @@
 //! Each shape has a row in a table of every world, and each contact pair that a model names one with its friction. Scalars of
 //! a contact follow from the rows of its two shapes by MuJoCo's rules (`mj_contactParam`).
 
+use super::axes_of;
 use crate::constants::contact::{
-    Contacts, MU_MIN, Solid, WEIGHT_MIN, mixing, pair, rule, soft, surface,
+    Contacts, MU_MIN, Solid, WEIGHT_MIN, mixing, pair, rule, soft, surface, surface_velocity,
 };
 use crate::constants::params::Param;
 use crate::constants::{IMPEDANCE_BOUNDS, SOLREF_DEFAULT, WIDTH_MIN};
 use crate::lane::{Cx, MaskOf, Num, map};
+use crate::math::vec3::{Vec3, load_vec3};
 use crate::step::ConstantsOf;
 use crate::step::params::param;
 use surface::{SOLIMP, SOLREF};
@@ -262,4 +264,49 @@ fn reference<F: Num>([first, second]: [F; 2], d_max: F, least_time: F) -> [F; 2]
 fn bounded<F: Num>(d: F) -> F {
     d.max(F::c(IMPEDANCE_BOUNDS[0]))
         .min(F::c(IMPEDANCE_BOUNDS[1]))
+}
+
+/// How the surface of a pair's second shape moves relative to that of the first, beside the shapes: velocity at the point that
+/// rows count from [m/s], and angular velocity [rad/s]. None where no surface moves.
+///
+/// The velocity of a surface at p is R v + (R ω) × (p - c), for a shape with axes R and centre c.
+#[inline(always)]
+pub(super) fn surface_motion<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    p: C::I,
+) -> Option<[Vec3<C::F>; 2]> {
+    if t.surface_velocities.rows == 0 {
+        return None;
+    }
+    let (indices, poses, origins) = (t.handles.pair_indices, t.memory.poses, t.memory.origins);
+    let start = cx.index(indices, p, pair::ORIGIN, origins.rows);
+    let start = load_vec3(cx, origins, start, 0);
+    let sides = [
+        (pair::SOLID_A, pair::ORIGIN_A),
+        (pair::SOLID_B, pair::ORIGIN_B),
+    ];
+    let mut motions = [[Vec3::zero(); 2]; 2];
+    for (side, (solid, origin)) in sides.into_iter().enumerate() {
+        let row = cx.index(indices, p, solid, poses.rows);
+        let origin = cx.index(indices, p, origin, origins.rows);
+        let origin = load_vec3(cx, origins, origin, 0);
+        // centre from the point that rows count from
+        let center = load_vec3(cx, poses, row, 9) + (origin - start);
+        let axes = axes_of(cx, poses, row);
+        let mut own = [C::F::c(0.0); surface_velocity::OF_SHAPE];
+        for (k, x) in own.iter_mut().enumerate() {
+            let column = side * surface_velocity::OF_SHAPE + k;
+            *x = cx.constant(t.surface_velocities, p, column);
+        }
+        // at that point: R v + c × (R ω)
+        let [x, y, z, u, v, w] = own;
+        let spin = axes.mul_add(Vec3([u, v, w]), Vec3::zero());
+        let linear = axes.mul_add(Vec3([x, y, z]), center.cross(spin));
+        motions[side] = [linear, spin];
+    }
+    // of the second side of rows relative to the first
+    let flip = cx.constant(t.handles.pair_numbers, p, pair::FLIP);
+    let [first, second] = motions;
+    Some([(second[0] - first[0]) * flip, (second[1] - first[1]) * flip])
 }

@@ -2,7 +2,8 @@
 //! documentation, "Computation: constraint model").
 //!
 //! ```text
-//! v = J q̇, of the second body relative to the first, along normal and tangents
+//! v = J q̇, of the second body relative to the first, along normal and tangents; along tangents, and about the normal, with
+//!     the velocity of surfaces that move beside their bodies (MuJoCo: `surfacevel`)
 //! elliptic      R₀ = (1 - d)/d w          D₁ = D₂ = impratio D₀
 //! pyramidal     R₀ = (1 - d)/d w (1 + μ²)  D = 1 / (2 μ² R₀ / impratio), of the edges n ± μ t
 //! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
@@ -12,6 +13,7 @@
 //! Rotations are scaled alike, by their friction over μ. A force along a scaled row is in units of that row.
 
 use super::joint_rows::{impedance, impedance_between};
+use super::swing::swing_between;
 use crate::arrays::Array as A;
 use crate::constants::contact::{
     COUNT_LEFT_OUT, Class, Cone, Contacts, pair, row, skew, soft, turning,
@@ -85,6 +87,8 @@ struct Contact<'a, C: Cx> {
     rubs: C::F,
     /// Normal and two tangents, of which the second is scaled; the tangents are 0 without friction.
     frame: [Vec3<C::F>; 3],
+    /// How fast the second surface moves beside its body, less the first [m/s], and its spin along the normal [rad/s].
+    surface: Option<(Vec3<C::F>, C::F)>,
 }
 
 impl<'a, C: Cx> Contact<'a, C> {
@@ -107,6 +111,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         if t.skew.rows > 0 {
             tangents[1] = tangents[1] * cx.pick(t.skew, pair, skew::SLIDE);
         }
+        let surface = surface_motion(cx, t, r);
         Contact {
             t,
             class,
@@ -116,6 +121,7 @@ impl<'a, C: Cx> Contact<'a, C> {
             point,
             rubs,
             frame: [normal, tangents[0] * rubs, tangents[1] * rubs],
+            surface,
         }
     }
 
@@ -170,6 +176,12 @@ impl<'a, C: Cx> Contact<'a, C> {
             }
             cx.fill_all(t.memory.rows, self.row, row::JACOBIAN + 3 * c, jacobian);
         }
+        // a surface that moves along its normal changes nothing
+        if let Some((moving, _)) = self.surface {
+            for i in 1..3 {
+                velocity[i] = velocity[i] + frame[i].dot(moving);
+            }
+        }
         cx.fill_all(t.memory.rows, self.row, row::TANGENTS, frame[1].0);
         cx.fill_all(t.memory.rows, self.row, row::TANGENTS + 3, frame[2].0);
         velocity
@@ -209,6 +221,9 @@ impl<'a, C: Cx> Contact<'a, C> {
                 block + turning::JACOBIAN + 3 * c,
                 jacobian,
             );
+        }
+        if let Some((_, spin)) = self.surface {
+            velocity[0] = scales[0].fma(spin, velocity[0]);
         }
         // the edges of a pyramid have the damping of the normal row
         let damping = match t.cone {
@@ -385,47 +400,6 @@ pub fn edge_stiffness<F: Num>(impratio: F::Real, mu: F) -> F {
 /// for mu < 0.22 at the default impratio of 1000.
 pub const EDGES_MAX: f64 = 1e4;
 
-/// The difference between MuJoCo's J q̈ and ours. The acceleration of a free joint is that of its frame's origin there, of the
-/// centre of mass here: they differ by ω × (ω × r). None where every centre of mass is its frame's origin.
-#[inline(always)]
-fn swing_between<C: Cx>(
-    cx: &mut C,
-    m: &ConstantsOf<C>,
-    b: &BlockOf<C>,
-    class: &Class<<C::F as Num>::Real>,
-) -> Option<Vec3<C::F>> {
-    let (first, second) = class.trees;
-    if first == Some(second) {
-        // both bodies move with the same tree
-        return None;
-    }
-    // of the second tree less that of the first, a static side having none
-    let first = first.and_then(|tree| swing(cx, m, b, tree));
-    let second = swing(cx, m, b, second);
-    match (first, second) {
-        (Some(first), Some(second)) => Some(second - first),
-        (Some(first), None) => Some(first * -C::F::c(1.0)),
-        (None, second) => second,
-    }
-}
-
-/// ω × (ω × r) of a tree's free body, with its centre of mass at r from its frame's origin.
-#[inline(always)]
-fn swing<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, tree: usize) -> Option<Vec3<C::F>> {
-    let free = m.trees[tree].free?;
-    let body = &m.bodies[free];
-    // MuJoCo's acceleration of this body is ours
-    if body.center.iter().all(|x| x.to_f64() == 0.0) {
-        return None;
-    }
-    let mut spin = Vec3::zero();
-    for (i, x) in spin.iter_mut().enumerate() {
-        *x = cx.get(&b.joint_qd[body.dof + 3 + i]);
-    }
-    // the frame's origin is kept relative to the centre
-    Some(spin.cross(b.work.origin[free].cross(spin)))
-}
-
 /// Keeps the largest count of contacts that did not fit.
 #[inline(always)]
 fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mut C::V) {
@@ -444,6 +418,25 @@ fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mu
     // the largest of all steps since it was cleared
     let left_out = cx.get(most).max(left_out);
     cx.set(most, left_out);
+}
+
+/// What the narrow phase left of surfaces that move beside their bodies; none where no surface does.
+#[inline(always)]
+fn surface_motion<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    r: C::I,
+) -> Option<(Vec3<C::F>, C::F)> {
+    if t.surface_velocities.rows == 0 {
+        return None;
+    }
+    let mut velocity = load_vec3(cx, t.memory.rows, r, row::SURFACE_VELOCITY);
+    // worlds without the contact have what is left of another one
+    for x in velocity.iter_mut() {
+        *x = cx.or_nothing(*x);
+    }
+    let spin = cx.load(t.memory.rows, r, row::SURFACE_SPIN);
+    Some((velocity, cx.or_nothing(spin)))
 }
 
 /// The list of a class's contacts.

@@ -5,8 +5,10 @@
 //! | `joint_rows` | mimic joints, dry friction, limits |
 //! | `ties`, `tied_frames` | equalities and limits of several joints or of frames |
 //! | `contact_rows` | contacts: Jacobian, impedance, friction |
+//! | `swing` | what J q̈ of free bodies has beside MuJoCo's |
 
 pub mod contact_rows;
 pub mod joint_rows;
+mod swing;
 pub mod tied_frames;
 pub mod ties;

@@ -287,6 +287,7 @@ fn candidates<C: Cx>(cx: &mut C, table: Table, out: &Points<C>) -> Points<C> {
         mu: None,
         varying: None,
         softness: None,
+        surface_motion: None,
         along: None,
         room: Room {
             is_tight: false,

@@ -23,6 +23,9 @@ pub struct Points<C: Cx> {
     pub varying: Option<[C::F; 3]>,
     /// Softness, where it varies; see [`soft`].
     pub softness: Option<[C::F; soft::COLUMNS]>,
+    /// How the second surface of rows moves relative to the first, beside the shapes: velocity at their reference point [m/s], and
+    /// angular velocity [rad/s]. None where no surface does.
+    pub surface_motion: Option<[Vec3<C::F>; 2]>,
     /// Direction of the first tangent where it is not 0 [–]; none where tangents may have any direction.
     pub along: Option<Vec3<C::F>>,
     /// What a world has room for.
@@ -72,6 +75,7 @@ impl<C: Cx> Points<C> {
         };
         let (list, table, pair) = (&mut self.list, self.table, self.pair);
         let (along, mu, varying, softness) = (self.along, self.mu, self.varying, self.softness);
+        let surface_motion = self.surface_motion;
         // from the reference point of the rows, with the direction of normals that the rows have
         let (point, normal) = (self.base + point, normal * self.flip);
         push!(cx, *list, mask, fresh, {
@@ -90,6 +94,13 @@ impl<C: Cx> Points<C> {
             if let Some(softness) = softness {
                 for (i, x) in softness.iter().enumerate() {
                     cx.init(table, fresh, row::SOFTNESS + i, *x);
+                }
+            }
+            if let Some([linear, spin]) = surface_motion {
+                // v + ω × p at the point, and ω · n
+                let Vec3([x, y, z]) = spin.cross_add(point, linear);
+                for (i, x) in [x, y, z, spin.dot(normal)].into_iter().enumerate() {
+                    cx.init(table, fresh, row::SURFACE_VELOCITY + i, x);
                 }
             }
             if let Some(along) = along {
