@@ -78,11 +78,12 @@ pub fn sensors() -> Case {
     case
 }
 
-/// Springs and dampers that are no lines, geoms as ellipsoids in a medium, adhesion and an idle tendon.
+/// Springs and dampers that are no lines, geoms as ellipsoids in a medium, adhesion, a belt and an idle tendon.
 pub fn passive() -> Case {
     let case = of_mujoco("passive");
     let m = &case.m;
     assert!(!m.fluid_geoms.is_empty() && !m.solved_bodies.is_empty());
+    assert!(m.contacts.adhesion.rows > 0 && m.contacts.surface_velocities.rows > 0);
     assert!(
         !m.actuators.adhesions.is_empty() && m.outputs.tendons.iter().any(|t| t.idle.is_some())
     );

@@ -29,6 +29,8 @@ pub struct GeomContact {
     pub gap: f64,
     /// How its surface moves beside it, in its frame: velocity at its origin, then angular velocity [m/s, rad/s]; none of a pair.
     pub surface_velocity: [f64; 6],
+    /// Force by which a contact pulls [N]; those of two geoms are added.
+    pub adhesion: f64,
 }
 
 /// Contact parameters that take the place of those of all geoms and pairs of a model (MuJoCo: the flag `override`).
@@ -72,6 +74,7 @@ impl GeomContact {
             margin: surface.margin,
             gap: surface.gap,
             surface_velocity: [0.0; 6],
+            adhesion: 0.0,
         }
     }
 
@@ -112,6 +115,7 @@ impl GeomContact {
             friction: std::array::from_fn(|i| self.friction[i].max(other.friction[i])),
             margin,
             gap,
+            adhesion: self.adhesion + other.adhesion,
             ..*self
         }
     }

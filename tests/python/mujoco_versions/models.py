@@ -166,6 +166,7 @@ class Model:
 _OVERRIDE = """<option o_margin=".003" o_solref=".03 .8" o_solimp=".8 .9 .01 .5 2" o_friction=".4 .4 .02 .001 .001">
   <flag override="enable"/></option><worldbody>"""
 _BELT = 'size="5 5 .1" surfacevel=".3 -.2 0 0 0 .5"'
+_GLUE = 'size="5 5 .1" adhesion="2" gap=".01"'
 # The machine's joint never reaches the first range and does reach the second.
 WIDE, NARROW = "-200 200", "-2 2"
 # Without contacts, rounding is what differs. Contacts amplify it by the stiffness of their rows.
@@ -200,6 +201,7 @@ MODELS = {
     "heap": Model(HEAP.format(cone="pyramidal"), 1e-6, 40),
     "heap-elliptic": Model(HEAP.format(cone="elliptic"), 1e-6, 40),
     "heap-belt": Model(HEAP.format(cone="elliptic").replace('size="5 5 .1"', _BELT, 1), 1e-6, 40),
+    "heap-sticky": Model(HEAP.format(cone="pyramidal").replace('size="5 5 .1"', _GLUE, 1), 1e-6, 40),
     "heap-override": Model(HEAP.format(cone="elliptic").replace("<worldbody>", _OVERRIDE, 1), 1e-6, 40),
 }
 
@@ -225,7 +227,9 @@ class Refused:
 
 REFUSED = {
     "adhesion": Refused(
-        (3, 11), _FALL.format('<geom name="glue" size=".1" adhesion="1"/>'), "geom `glue`: no support for adhesion"
+        (3, 11),
+        _FALL.format('<geom name="glue" size=".1" adhesion="-1"/>'),
+        "geom `glue`: no support for a negative adhesion",
     ),
     "DC motors": Refused(
         (3, 11),

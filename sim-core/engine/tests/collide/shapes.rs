@@ -210,6 +210,7 @@ pub fn contacts_of_geoms(machine: Machine, pairs: &[Pair], margin: f64) -> Vec<V
         margin: 0.0,
         gap: 0.0,
         surface_velocity: [0.0; 6],
+        adhesion: 0.0,
     };
     contacts_of(machine, &[], pairs, margin, Some(geom))
 }

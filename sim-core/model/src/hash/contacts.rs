@@ -35,6 +35,7 @@ view! {
         Later { "turning": turning }
         Later { "skew": skew }
         Later { "surface_velocities": surface_velocities }
+        Later { "adhesion": adhesion }
         Later { "combine": combine, "keeps_max": keeps_max }
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         Never { "ordered_corners": ordered_corners }

@@ -205,6 +205,14 @@ impl ModelFile {
         }
     }
 
+    /// An array of numbers; all are `other` where this version of MuJoCo has no such array.
+    pub fn reals_or(&self, name: &str, count: usize, other: f64) -> Result<Vec<f64>, ModelError> {
+        match self.has(name) {
+            true => self.reals(name, count),
+            false => Ok(vec![other; count]),
+        }
+    }
+
     /// One number.
     pub fn real(&self, name: &str) -> Result<f64, ModelError> {
         Ok(self.reals(name, 1)?[0])

@@ -119,6 +119,7 @@ fn contacts(file: &ModelFile, count: usize) -> Result<Vec<GeomContact>, ModelErr
         true => file.vectors::<6>("geom_surfacevel", count)?,
         false => vec![[0.0; 6]; count],
     };
+    let adhesions = file.reals_or("geom_adhesion", count, 0.0)?;
     let all = (0..count).map(|k| GeomContact {
         contype: contypes[k] as u32,
         conaffinity: conaffinities[k] as u32,
@@ -130,6 +131,7 @@ fn contacts(file: &ModelFile, count: usize) -> Result<Vec<GeomContact>, ModelErr
         margin: margins[k],
         gap: gaps[k],
         surface_velocity: surface_velocities[k],
+        adhesion: adhesions[k],
     });
     Ok(all.collect())
 }

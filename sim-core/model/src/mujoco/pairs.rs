@@ -54,6 +54,7 @@ pub(super) fn add_pairs(
     let frictions = file.vectors::<5>("pair_friction", count)?;
     let margins = file.reals("pair_margin", count)?;
     let gaps = file.reals("pair_gap", count)?;
+    let adhesions = file.reals_or("pair_adhesion", count, 0.0)?;
     for (k, geoms) in pairs.into_iter().enumerate() {
         let [Some(first), Some(second)] = geoms.map(|geom| places[geom]) else {
             return Err(file.fault("has a pair without its geoms".to_owned()));
@@ -73,6 +74,7 @@ pub(super) fn add_pairs(
                 margin: margins[k],
                 gap: gaps[k],
                 surface_velocity: [0.0; 6],
+                adhesion: adhesions[k],
             },
             second: [across, roll_across],
             sliding: (sliding[k] != [0.0; 2]).then_some(sliding[k]),

@@ -14,9 +14,7 @@ use crate::softness::POWER_MAX;
 /// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature. Older
 /// versions of MuJoCo do not have them.
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
-    ("pair", "pair_adhesion", "adhesion"),
     ("joint", "jnt_springyield", "plastic springs"),
-    ("geom", "geom_adhesion", "adhesion"),
     ("tendon", "tendon_springyield", "plastic springs"),
     ("actuator", "actuator_delay", "a delay"),
 ];
@@ -85,6 +83,8 @@ pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     tendons(file, &mut refused)?;
     actuators(file, &mut refused)?;
     adhesions(file, &mut refused)?;
+    sticky(file, "geom", &mut refused)?;
+    sticky(file, "pair", &mut refused)?;
     Ok(refused)
 }
 
@@ -349,6 +349,27 @@ fn adhesions(file: &ModelFile, refused: &mut Vec<String>) -> Result<(), ModelErr
         ];
         let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
         refused.extend(wrong.map(|(_, what)| no("actuator", &names[k], what)));
+    }
+    Ok(())
+}
+
+/// What contacts that pull cannot do.
+fn sticky(file: &ModelFile, kind: &str, refused: &mut Vec<String>) -> Result<(), ModelError> {
+    let array = format!("{kind}_adhesion");
+    let count = file.rows(&array);
+    let names = names(file, kind, count)?;
+    // MuJoCo then drops the pull and keeps what balances it
+    let is_off = has_flag(file, "mjDSBL_SPRING")? && has_flag(file, "mjDSBL_DAMPER")?;
+    for (name, force) in names.iter().zip(file.reals_or(&array, count, 0.0)?) {
+        let wrong = [
+            (force < 0.0, "a negative adhesion"),
+            (
+                force > 0.0 && is_off,
+                "adhesion where springs and dampers are disabled",
+            ),
+        ];
+        let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);
+        refused.extend(wrong.map(|(_, what)| no(kind, name, what)));
     }
     Ok(())
 }

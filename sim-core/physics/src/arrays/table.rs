@@ -95,8 +95,8 @@ arrays! { m;
         contact_records: ContactRecords [m.sensors.record_scalars()] Scratch "–";
         // torque, then force, of the contacts of each body of MuJoCo models
         contact_wrench: ContactWrench [6 * m.outputs.bodies.len()] Scratch "N·m, N";
-        // sum of the normal rows of the contacts of a body that an actuator pulls to them
-        adhesion_moment: AdhesionMoment [if m.actuators.adhesions.is_empty() { 0 } else { m.dofs.len() }] Scratch "–";
+        // sum of the normal rows of contacts that pull: by an actuator, or as their shapes adhere
+        adhesion_moment: AdhesionMoment [if m.actuators.adhesions.is_empty() && m.contacts.adhesion.rows == 0 { 0 } else { m.dofs.len() }] Scratch "–";
     }
     values {
         joint_f: JointF [Scalar; m.dofs.len()] Command "N·m or N"

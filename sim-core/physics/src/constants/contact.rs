@@ -62,6 +62,8 @@ recast! {
         pub skew: Fixed,
         /// How the surfaces of each pair's shapes move beside the shapes ([`surface_velocity`]); without rows where none does.
         pub surface_velocities: Fixed,
+        /// Forces by which each pair's contacts pull ([`adhesion`]); without rows where none does.
+        pub adhesion: Fixed,
         /// How the friction of two shapes combines.
         pub combine: FrictionCombine,
         /// Of each pair, which friction counts ([`rule`]); without rows where all combine, or all have the larger one.
@@ -186,6 +188,18 @@ pub mod surface_velocity {
     pub const OF_SHAPE: usize = 6;
     /// Columns: those of the first, then of the second shape.
     pub const COLUMNS: usize = 2 * OF_SHAPE;
+}
+
+/// Columns of the table of pairs whose contacts pull.
+pub mod adhesion {
+    /// Force of a contact [N].
+    pub const FORCE: usize = 0;
+    /// Its share in each row that the normal force is the sum of, where a contact has friction [N].
+    pub const ROW: usize = 1;
+    /// The same where it has none [N].
+    pub const ROW_IN_GAP: usize = 2;
+    /// Columns.
+    pub const COLUMNS: usize = 3;
 }
 
 /// Which friction of two shapes counts for a pair, where it varies.
@@ -613,6 +627,7 @@ impl<R: Real> Contacts<R> {
             turning: Fixed::default(),
             skew: Fixed::default(),
             surface_velocities: Fixed::default(),
+            adhesion: Fixed::default(),
             combine: FrictionCombine::Max,
             keeps_max: Fixed::default(),
             has_rules: false,

@@ -78,11 +78,13 @@ macro_rules! every_stage {
             contact_rows         [constraints::contact_rows::ContactRows]    Both;
             // the forces along contacts, which ends those of actuators
             adhesion             [forces::adhesion::Adhesion]                Both;
+            contact_adhesion     [forces::contact_adhesion::Pull]            Both;
             // accelerations and constraint forces, then the next state
             solver               [solver::Solver::<false>]                   Both;
             solver_turning       [solver::Solver::<true>]                    Both;
             refine               [solver::Refine]                            Both;
             noslip               [solver::NoSlip]                            Both;
+            net_contact_forces   [forces::contact_adhesion::NetForces]       Both;
             integrate            [integrate::semi_implicit::Integrate]       Step;
             implicit             [integrate::implicit::Implicit]             Step;
             // in its place, as `schedule::step_stages` orders them
@@ -102,6 +104,7 @@ macro_rules! every_stage {
             height_scan          [outputs::height_scan::HeightScans]         Evaluation;
             site_inverse         [outputs::site_inverse::SiteInverse]        Evaluation;
             passive              [forces::springs::Passive]                  Evaluation;
+            passive_adhesion     [forces::contact_adhesion::PassivePull]     Evaluation;
             frames_of_bodies     [outputs::frames::Bodies]                   Evaluation;
             frames_of_sites      [outputs::frames::Sites]                    Evaluation;
             frames_of_geoms      [outputs::frames::Geoms]                    Evaluation;

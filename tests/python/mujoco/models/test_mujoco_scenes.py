@@ -171,9 +171,9 @@ def test_commands_are_checked(model):
         ),
         (
             '<worldbody><body name="b"><joint name="j" range="-9 9"/>'
-            '<geom name="g" size=".1" adhesion="1"/></body></worldbody>'
+            '<geom name="g" size=".1" adhesion="-1"/></body></worldbody>'
             '<actuator><general name="m" body="b" biastype="affine" biasprm="0 0 -1"/></actuator>',
-            ["geom `g`: no support for adhesion", "actuator `m`: no support for adhesion by a force"],
+            ["geom `g`: no support for a negative adhesion", "actuator `m`: no support for adhesion by a force"],
         ),
         (
             '<worldbody><geom name="f" type="plane" size="1 1 1"/>'

@@ -31,7 +31,7 @@ def arm(*, option: str = "", geom: str = "", more: str = "", actuators: str = ""
     ("parts", "without", "note"),
     [
         ({"option": 'integrator="discrete"'}, "integrator", "mjINT_IMPLICITFAST takes the place"),
-        ({"geom": 'adhesion="1"'}, "palm", "geom `palm` touches nothing"),
+        ({"geom": 'adhesion="-1"'}, "palm", "geom `palm` touches nothing"),
         ({"more": BALL_TENDON}, "odd", "tendon `odd` has length 0"),
         ({"more": BALL_TENDON, "actuators": '<motor name="pull" tendon="odd"/>'}, "tendon:odd", "by its 1 actuators"),
         ({"actuators": ODD_PAD}, "pad", "exerts no force"),

@@ -7,7 +7,7 @@ mod pairs;
 pub(super) mod pieces;
 mod reference;
 pub(super) mod sensors;
-mod surface_velocities;
+mod surface_extras;
 mod varying;
 
 use crate::description::Description;
@@ -164,6 +164,7 @@ impl ContactBuilder<'_> {
         self.add_mixing(contacts, pairs);
         self.add_named_pairs(contacts, pairs);
         self.add_surface_velocities(contacts, pairs);
+        self.add_adhesion(contacts, pairs);
         contacts.two_point_capsule_boxes = pairs.iter().any(|&pair| self.is_capsule_box_geom(pair));
         contacts.are_stiff = self.are_stiff(pairs, &mu);
         let coupled = self.coupled(contacts);

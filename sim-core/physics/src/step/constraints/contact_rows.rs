@@ -7,11 +7,15 @@
 //! elliptic      R₀ = (1 - d)/d w          D₁ = D₂ = impratio D₀
 //! pyramidal     R₀ = (1 - d)/d w (1 + μ²)  D = 1 / (2 μ² R₀ / impratio), of the edges n ± μ t
 //! aref = -b v - k d (r - margin)  along the normal,   -b' v along a tangent
+//! aref = -b v - k d (r - margin) + F / D   along the normal of a contact that adheres with the force F
 //! ```
+//!
+//! A contact that adheres also has a row of its normal in the gap, without friction.
 //!
 //! μ is that of the first tangent. Where the second one has another, it is as long as the ratio of both: cones are round then.
 //! Rotations are scaled alike, by their friction over μ. A force along a scaled row is in units of that row.
 
+use super::contact_surfaces::{Pull, SurfaceMotion};
 use super::joint_rows::{impedance, impedance_between};
 use super::swing::swing_between;
 use crate::arrays::Array as A;
@@ -20,7 +24,7 @@ use crate::constants::contact::{
 };
 use crate::constants::{Constants, Impedance};
 use crate::each;
-use crate::lane::{Cx, Num, Real};
+use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::spatial::Spatial;
 use crate::math::vec3::{Vec3, load_vec3};
 use crate::step::collide::contact_slack;
@@ -87,8 +91,14 @@ struct Contact<'a, C: Cx> {
     rubs: C::F,
     /// Normal and two tangents, of which the second is scaled; the tangents are 0 without friction.
     frame: [Vec3<C::F>; 3],
-    /// How fast the second surface moves beside its body, less the first [m/s], and its spin along the normal [rad/s].
-    surface: Option<(Vec3<C::F>, C::F)>,
+    /// From the distance at which it pushes [m].
+    position: C::F,
+    /// Where that is nearer than the margin, not in the gap.
+    is_near: MaskOf<C>,
+    /// How it adheres, in a model with such contacts.
+    pull: Option<Pull<C>>,
+    /// How surfaces move beside their bodies, in a model with such surfaces.
+    surface: Option<SurfaceMotion<C::F>>,
 }
 
 impl<'a, C: Cx> Contact<'a, C> {
@@ -100,7 +110,15 @@ impl<'a, C: Cx> Contact<'a, C> {
         let point = load_vec3(cx, t.memory.rows, r, row::POINT);
         let pair = cx.load(t.memory.rows, r, row::PAIR);
         // pairs of one class may differ in whether they have friction
-        let rubs = shared(cx, t, class, pair, pair::RUBS);
+        let mut rubs = shared(cx, t, class, pair, pair::RUBS);
+        let distance = cx.load(t.memory.rows, r, row::DISTANCE);
+        let position = distance - shared(cx, t, class, pair, pair::MARGIN);
+        let smaller = shared(cx, t, class, pair, pair::SMALLER);
+        let is_near = position.lt(contact_slack(t, smaller));
+        let pull = Pull::read(cx, t, pair, is_near);
+        if let Some(pull) = &pull {
+            rubs = C::F::select(is_near | !pull.adheres, rubs, C::F::c(0.0));
+        }
         // where directions matter, the narrow phase chose the first
         let along = match t.has_directions() {
             false => None,
@@ -111,7 +129,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         if t.skew.rows > 0 {
             tangents[1] = tangents[1] * cx.pick(t.skew, pair, skew::SLIDE);
         }
-        let surface = surface_motion(cx, t, r);
+        let surface = SurfaceMotion::read(cx, t, r);
         Contact {
             t,
             class,
@@ -121,6 +139,9 @@ impl<'a, C: Cx> Contact<'a, C> {
             point,
             rubs,
             frame: [normal, tangents[0] * rubs, tangents[1] * rubs],
+            position,
+            is_near,
+            pull,
             surface,
         }
     }
@@ -177,9 +198,9 @@ impl<'a, C: Cx> Contact<'a, C> {
             cx.fill_all(t.memory.rows, self.row, row::JACOBIAN + 3 * c, jacobian);
         }
         // a surface that moves along its normal changes nothing
-        if let Some((moving, _)) = self.surface {
+        if let Some(surface) = &self.surface {
             for i in 1..3 {
-                velocity[i] = velocity[i] + frame[i].dot(moving);
+                velocity[i] = velocity[i] + frame[i].dot(surface.velocity);
             }
         }
         cx.fill_all(t.memory.rows, self.row, row::TANGENTS, frame[1].0);
@@ -222,24 +243,20 @@ impl<'a, C: Cx> Contact<'a, C> {
                 jacobian,
             );
         }
-        if let Some((_, spin)) = self.surface {
-            velocity[0] = scales[0].fma(spin, velocity[0]);
+        if let Some(surface) = &self.surface {
+            velocity[0] = scales[0].fma(surface.spin, velocity[0]);
         }
         // the edges of a pyramid have the damping of the normal row
         let damping = match t.cone {
             Cone::Elliptic => self.softness(cx, pair::SLIDING),
             Cone::Pyramidal => self.softness(cx, pair::DAMPING),
         };
-        // no force past the margin, as in `write_softness`
-        let distance = cx.load(t.memory.rows, self.row, row::DISTANCE);
-        let position = distance - self.of_pair(cx, pair::MARGIN);
-        let smaller = self.of_pair(cx, pair::SMALLER);
-        let pushes = position.lt(contact_slack(t, smaller));
         // aref = -b v, and a row exists where its friction is positive
         let mut aref = [zero; 3];
         let mut exists = [zero; 3];
         for i in 0..3 {
-            aref[i] = C::F::select(pushes, -(velocity[i] * damping), zero);
+            // no friction past the margin
+            aref[i] = C::F::select(self.is_near, -(velocity[i] * damping), zero);
             exists[i] = C::F::select(zero.lt(scales[i]), one, zero);
         }
         cx.fill_all(t.memory.rows, self.row, block + turning::AREF, aref);
@@ -295,8 +312,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         let (t, r) = (self.t, self.row);
         let (zero, one) = (C::F::c(0.0), C::F::c(1.0));
         // r - margin, and the impedance d there
-        let distance = cx.load(t.memory.rows, r, row::DISTANCE);
-        let position = distance - self.of_pair(cx, pair::MARGIN);
+        let position = self.position;
         let d = self.impedance(cx, m, position);
         // μ of the pair, or that of the contact where it varies, and 0 without friction
         let mu = match t.varying.mu {
@@ -322,9 +338,12 @@ impl<'a, C: Cx> Contact<'a, C> {
         for i in 1..3 {
             aref[i] = -(velocity[i] * sliding);
         }
-        // a contact past the margin has no force
-        let smaller = self.of_pair(cx, pair::SMALLER);
-        let pushes = position.lt(contact_slack(t, smaller));
+        // a contact past the margin has no force, unless it adheres
+        let mut pushes = self.is_near;
+        if let Some(pull) = &self.pull {
+            pushes = pushes | pull.adheres;
+            aref[0] = aref[0] + pull.share.div(stiff);
+        }
         let stiff = C::F::select(pushes, stiff, zero);
         cx.fill(t.memory.rows, r, row::STIFFNESS, stiff);
         // D₀ / (1 + μ²/impratio): the stiffness of a contact that slides
@@ -418,25 +437,6 @@ fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mu
     // the largest of all steps since it was cleared
     let left_out = cx.get(most).max(left_out);
     cx.set(most, left_out);
-}
-
-/// What the narrow phase left of surfaces that move beside their bodies; none where no surface does.
-#[inline(always)]
-fn surface_motion<C: Cx>(
-    cx: &mut C,
-    t: &Contacts<<C::F as Num>::Real>,
-    r: C::I,
-) -> Option<(Vec3<C::F>, C::F)> {
-    if t.surface_velocities.rows == 0 {
-        return None;
-    }
-    let mut velocity = load_vec3(cx, t.memory.rows, r, row::SURFACE_VELOCITY);
-    // worlds without the contact have what is left of another one
-    for x in velocity.iter_mut() {
-        *x = cx.or_nothing(*x);
-    }
-    let spin = cx.load(t.memory.rows, r, row::SURFACE_SPIN);
-    Some((velocity, cx.or_nothing(spin)))
 }
 
 /// The list of a class's contacts.

@@ -6,6 +6,7 @@
 //! | `actuation` | drives: PD gains and effort limits |
 //! | `actuators`, `transmission` | actuators: activation, gain, bias, and the lengths along which they act |
 //! | `adhesion` | actuators that pull bodies to what they touch |
+//! | `contact_adhesion` | contacts that pull, since their shapes adhere |
 //! | `damping` | damping of actuators and tendons in an implicit step |
 //! | `motors` | DC motors: voltage, current, cogging |
 //! | `muscles` | gain, bias and activation of muscles |
@@ -19,6 +20,7 @@ pub mod actuation;
 pub mod actuators;
 pub mod adhesion;
 pub mod command;
+pub mod contact_adhesion;
 pub(in crate::step) mod curves;
 pub mod damping;
 pub mod ellipsoid_fluid;

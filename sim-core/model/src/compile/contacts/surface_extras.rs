@@ -1,7 +1,7 @@
-//! Tables of pairs whose surfaces move beside their shapes, as belts do (MuJoCo: `surfacevel`).
+//! Tables of pairs whose surfaces move beside their shapes, as belts do (MuJoCo: `surfacevel`), and of pairs that adhere.
 
-use super::pairs::ContactBuilder;
-use sim_physics::constants::contact::{Contacts, surface_velocity};
+use super::pairs::{ContactBuilder, rows_of};
+use sim_physics::constants::contact::{Cone, Contacts, adhesion, surface_velocity};
 use sim_physics::lane::Fixed;
 use surface_velocity::{COLUMNS, OF_SHAPE};
 
@@ -26,6 +26,35 @@ impl ContactBuilder<'_> {
             rows: pairs.len(),
         };
         contacts.tables.numbers.extend(rows);
+    }
+
+    /// Notes the forces by which contacts of each pair pull, if any does.
+    pub(super) fn add_adhesion(&self, contacts: &mut Contacts<f64>, pairs: &[(usize, usize)]) {
+        let rows: Vec<_> = pairs.iter().map(|&pair| self.adhesion(pair)).collect();
+        if rows.iter().all(|row| row[adhesion::FORCE] == 0.0) {
+            return;
+        }
+        contacts.adhesion = Fixed {
+            base: contacts.tables.numbers.len(),
+            stride: adhesion::COLUMNS,
+            rows: pairs.len(),
+        };
+        contacts.tables.numbers.extend(rows.as_flattened());
+    }
+
+    /// The force by which a contact pulls, by the columns of its table.
+    fn adhesion(&self, (a, b): (usize, usize)) -> [f64; adhesion::COLUMNS] {
+        let [x, y] = [a, b].map(|piece| &self.shapes[self.pieces[piece].shape]);
+        let Some(geom) = self.geom_pair(x, y) else {
+            return [0.0; adhesion::COLUMNS];
+        };
+        // the edges of a pyramid share it; without friction there are four, which coincide
+        let share = |condim: usize| match self.scene.solver.cone {
+            Cone::Elliptic => geom.adhesion,
+            Cone::Pyramidal if condim == 1 => geom.adhesion / 4.0,
+            Cone::Pyramidal => geom.adhesion / rows_of(Cone::Pyramidal, condim) as f64,
+        };
+        [geom.adhesion, share(geom.condim), share(1)]
     }
 
     /// How the surface of a piece moves: velocity at its centre, then angular velocity, in its axes.
