@@ -149,14 +149,14 @@ impl ContactBuilder<'_> {
         x: &PlacedShape<'_>,
         y: &PlacedShape<'_>,
     ) -> Option<GeomContact> {
-        let own = match named_pair(x, y, self.rules) {
+        let contact = match named_pair(x, y, self.rules) {
             Some(pair) => pair.contact,
             None if x.geom.is_some() || y.geom.is_some() => geom_of(x).combined(&geom_of(y)),
             None => return None,
         };
         Some(match overriding(x, y, self.rules) {
-            Some(by) => own.overridden(by),
-            None => own,
+            Some(by) => contact.overridden(by),
+            None => contact,
         })
     }
 

@@ -103,6 +103,7 @@ pub(super) fn friction<C: Cx>(
             let of_pair = friction_of_pair(cx, t, p, column);
             mu = C::F::select(is_at_least(rule::OWN), of_pair, mu);
             // beside pairs whose own friction varies, others have that of their model
+            // (without such pairs, `of_pair` has it already)
             if t.varying.pairs {
                 let fixed = fixed_friction(cx, t, p, column);
                 mu = C::F::select(is_at_least(rule::FIXED), fixed, mu);
@@ -280,6 +281,7 @@ pub(super) fn surface_motion<C: Cx>(
         return None;
     }
     let (indices, poses, origins) = (t.handles.pair_indices, t.memory.poses, t.memory.origins);
+    // the point that rows of the class count from
     let start = cx.index(indices, p, pair::ORIGIN, origins.rows);
     let start = load_vec3(cx, origins, start, 0);
     let sides = [
@@ -288,19 +290,21 @@ pub(super) fn surface_motion<C: Cx>(
     ];
     let mut motions = [[Vec3::zero(); 2]; 2];
     for (side, (solid, origin)) in sides.into_iter().enumerate() {
+        // the shape and the reference point of its tree
         let row = cx.index(indices, p, solid, poses.rows);
         let origin = cx.index(indices, p, origin, origins.rows);
         let origin = load_vec3(cx, origins, origin, 0);
-        // centre from the point that rows count from
+        // its centre from the point that rows count from
         let center = load_vec3(cx, poses, row, 9) + (origin - start);
         let axes = axes_of(cx, poses, row);
-        let mut own = [C::F::c(0.0); surface_velocity::OF_SHAPE];
-        for (k, x) in own.iter_mut().enumerate() {
+        // v and ω in the axes of the shape
+        let mut local = [C::F::c(0.0); surface_velocity::OF_SHAPE];
+        for (k, x) in local.iter_mut().enumerate() {
             let column = side * surface_velocity::OF_SHAPE + k;
             *x = cx.constant(t.surface_velocities, p, column);
         }
         // at that point: R v + c × (R ω)
-        let [x, y, z, u, v, w] = own;
+        let [x, y, z, u, v, w] = local;
         let spin = axes.mul_add(Vec3([u, v, w]), Vec3::zero());
         let linear = axes.mul_add(Vec3([x, y, z]), center.cross(spin));
         motions[side] = [linear, spin];

@@ -111,11 +111,13 @@ impl<'a, C: Cx> Contact<'a, C> {
         let pair = cx.load(t.memory.rows, r, row::PAIR);
         // pairs of one class may differ in whether they have friction
         let mut rubs = shared(cx, t, class, pair, pair::RUBS);
+        // r - margin, and whether the contact pushes or is in the gap
         let distance = cx.load(t.memory.rows, r, row::DISTANCE);
         let position = distance - shared(cx, t, class, pair, pair::MARGIN);
         let smaller = shared(cx, t, class, pair, pair::SMALLER);
         let is_near = position.lt(contact_slack(t, smaller));
         let pull = Pull::read(cx, t, pair, is_near);
+        // what adheres in the gap does not rub
         if let Some(pull) = &pull {
             rubs = C::F::select(is_near | !pull.adheres, rubs, C::F::c(0.0));
         }
@@ -243,6 +245,7 @@ impl<'a, C: Cx> Contact<'a, C> {
                 jacobian,
             );
         }
+        // surfaces turn against each other as bodies do
         if let Some(surface) = &self.surface {
             velocity[0] = scales[0].fma(surface.spin, velocity[0]);
         }
@@ -342,6 +345,7 @@ impl<'a, C: Cx> Contact<'a, C> {
         let mut pushes = self.is_near;
         if let Some(pull) = &self.pull {
             pushes = pushes | pull.adheres;
+            // D is not yet 0 where nothing pushes
             aref[0] = aref[0] + pull.share.div(stiff);
         }
         let stiff = C::F::select(pushes, stiff, zero);

@@ -28,6 +28,7 @@ impl<C: Cx> Pull<C> {
         // in the gap, a contact has no friction
         let near = cx.pick(t.adhesion, pair, adhesion::ROW);
         let in_gap = cx.pick(t.adhesion, pair, adhesion::ROW_IN_GAP);
+        // without friction, a pyramid has four edges that coincide
         Some(Pull {
             adheres: C::F::c(0.0).lt(force),
             share: C::F::select(is_near, near, in_gap),
@@ -54,11 +55,13 @@ impl<F: Num> SurfaceMotion<F> {
         if t.surface_velocities.rows == 0 {
             return None;
         }
+        // of surfaces alone: that of the bodies is J q̇
         let mut velocity = load_vec3(cx, t.memory.rows, r, row::SURFACE_VELOCITY);
         // worlds without the contact have what is left of another one
         for x in velocity.iter_mut() {
             *x = cx.or_nothing(*x);
         }
+        // friction of torsion follows the spin along the normal alone
         let spin = cx.load(t.memory.rows, r, row::SURFACE_SPIN);
         let spin = cx.or_nothing(spin);
         Some(SurfaceMotion { velocity, spin })

@@ -30,6 +30,7 @@ impl Stage for Pull {
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         sum_pulls(cx, m, b);
+        // smooth -= Σ F Jᵀ
         for (force, sum) in b.work.smooth_force.iter_mut().zip(&b.adhesion_moment) {
             *force = *force - cx.get(sum);
         }
@@ -50,6 +51,7 @@ impl Stage for PassivePull {
     #[inline(always)]
     fn run<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         sum_pulls(cx, m, b);
+        // MuJoCo's `qfrc_passive` contains `qfrc_adhesion`
         for (force, sum) in b.work.passive_force.iter_mut().zip(&b.adhesion_moment) {
             *force = *force - cx.get(sum);
         }
@@ -60,6 +62,7 @@ impl Stage for PassivePull {
 #[inline(always)]
 fn sum_pulls<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     let t = &m.contacts;
+    // the stage of actuators that adhere may have left its own sums
     for cell in &mut b.adhesion_moment {
         cx.set(cell, C::F::c(0.0));
     }
@@ -67,6 +70,7 @@ fn sum_pulls<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         let list = class_list(cx, t, number);
         each!(cx, r in list, {
             let pair = cx.load(t.memory.rows, r, row::PAIR);
+            // 0 for pairs that do not adhere
             let pull = cx.pick(t.adhesion, pair, adhesion::FORCE);
             // of three rows per column, the first is the normal's
             for (c, column) in class.columns.iter().enumerate() {
@@ -100,6 +104,7 @@ impl Stage for NetForces {
                 let pull = cx.pick(t.adhesion, pair, adhesion::FORCE);
                 // worlds without the contact keep no force, as the solver left them
                 let net = cx.load(t.memory.rows, r, row::FORCE) - pull;
+                // outputs and sensors then read the net force alone
                 let net = cx.only(net);
                 cx.fill(t.memory.rows, r, row::FORCE, net);
             });
