@@ -5,12 +5,15 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use sim_picture::{Instance, Line, Mesh, Shading, Shot, View};
+use sim_picture::{Instance, Lamp, Line, Mesh, Shading, Shot, View};
 
 use crate::errors::raise;
 
 /// Longest side of a picture [pixels]: beyond, places in 16ths of a pixel lose their fractions.
 const SIDE_MAX: usize = 8192;
+/// Numbers of a lamp: whether it is at a place, the place, direction, ambient, diffuse and specular light, attenuation,
+/// cutoff, exponent, and whether it may cast shadows.
+const LAMP: usize = 22;
 
 /// Keeps meshes and draws them. `tightloop.view.Picture` wraps it, and documents what a picture shows.
 #[pyclass(frozen, module = "tightloop._core")]
@@ -73,6 +76,9 @@ impl Renderer {
 
     /// A picture, uint8, shape ``(height, width, 3)``.
     #[allow(clippy::too_many_arguments, reason = "arrays of one length each")]
+    #[pyo3(signature = (
+        camera, angle, around, floor, meshes, poses, tints, opacities, lines, line_colors, line_widths, lamps = None
+    ))]
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -87,12 +93,22 @@ impl Renderer {
         lines: PyReadonlyArray2<'py, f64>,
         line_colors: PyReadonlyArray2<'py, u8>,
         line_widths: PyReadonlyArray1<'py, f32>,
+        lamps: Option<PyReadonlyArray2<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         let refused = |problem: &str| Err(raise(py, "ArgumentError", problem.to_owned()));
         let poses: Vec<[f64; 7]> = rows(py, "poses", &poses.as_array())?;
         let tints: Vec<[u8; 4]> = rows(py, "tints", &tints.as_array())?;
         let ends: Vec<[f64; 6]> = rows(py, "lines", &lines.as_array())?;
         let colors: Vec<[u8; 4]> = rows(py, "line_colors", &line_colors.as_array())?;
+        let lamps: Vec<[f64; LAMP]> = match lamps {
+            Some(lamps) => rows(py, "lamps", &lamps.as_array())?,
+            None => Vec::new(),
+        };
+        let lamps: Vec<Lamp> = lamps
+            .iter()
+            .filter(|row| row.iter().all(|part| part.is_finite()))
+            .map(lamp)
+            .collect();
         let (meshes, opacities) = (meshes.as_array(), opacities.as_array());
         let widths = line_widths.as_array();
         if [poses.len(), tints.len(), opacities.len()] != [meshes.len(); 3] {
@@ -141,6 +157,7 @@ impl Renderer {
             view: View::looking(eye, target, up, angle, self.size),
             instances: &instances,
             lines: &lines,
+            lamps: &lamps,
             floor,
             backdrop: None,
             outlines: false,
@@ -168,6 +185,23 @@ fn checked_size(py: Python<'_>, width: usize, height: usize) -> PyResult<[usize;
         }
     }
     Ok([width, height])
+}
+
+/// A lamp of its row.
+fn lamp(row: &[f64; LAMP]) -> Lamp {
+    let three = |first: usize| std::array::from_fn(|axis| row[first + axis]);
+    let single = |first: usize| std::array::from_fn(|axis| row[first + axis] as f32);
+    Lamp {
+        position: (row[0] != 0.0).then(|| three(1)),
+        direction: three(4),
+        ambient: single(7),
+        diffuse: single(10),
+        specular: single(13),
+        attenuation: single(16),
+        cutoff: row[19] as f32,
+        exponent: row[20] as f32,
+        shadows: row[21] != 0.0,
+    }
 }
 
 /// Rows of so many numbers.

@@ -209,8 +209,8 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-daemon/picture/src",
         &[
-            "vector", "view", "normals", "mesh", "clip", "cover", "threads", "project", "tile",
-            "rays", "outlines", "shadow", "shade", "marks", "renderer",
+            "vector", "single", "view", "normals", "mesh", "clip", "cover", "threads", "project",
+            "tile", "rays", "outlines", "shadow", "lamps", "shade", "marks", "renderer",
         ],
     ),
     (

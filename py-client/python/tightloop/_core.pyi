@@ -580,6 +580,7 @@ class Renderer:
         lines: NDArray[np.float64],
         line_colors: NDArray[np.uint8],
         line_widths: NDArray[np.float32],
+        lamps: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
         """Render a picture, shape ``(height, width, 3)``; instances and lines that are not finite are left out.
 
@@ -595,4 +596,6 @@ class Renderer:
             lines: Both ends of overlay lines [m], shape ``(l, 6)``; equal ends make a dot.
             line_colors: Red, green, blue, opacity, shape ``(l, 4)``.
             line_widths: Width of each line [pixels], shape ``(l,)``.
+            lamps: Lights of the scene, shape ``(n, 22)``, as `tightloop.view.lights.rows` makes them; fixed lights if
+                left out.
         """

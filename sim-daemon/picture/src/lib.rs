@@ -8,6 +8,7 @@
 
 mod clip;
 mod cover;
+mod lamps;
 mod marks;
 mod mesh;
 mod normals;
@@ -17,6 +18,7 @@ mod rays;
 mod renderer;
 mod shade;
 mod shadow;
+mod single;
 #[cfg(test)]
 mod tests;
 mod threads;
@@ -24,6 +26,7 @@ mod tile;
 pub mod vector;
 mod view;
 
+pub use lamps::Lamp;
 pub use marks::Line;
 pub use mesh::{Mesh, MeshError, Shading};
 pub use renderer::{Instance, Renderer, Shot};

@@ -2,6 +2,7 @@
 
 use crate::clip::NEAREST;
 use crate::cover::SUB;
+use crate::lamps::{Lamp, Lamps, caster};
 use crate::marks::{Line, Mark};
 use crate::mesh::{Mesh, Piece};
 use crate::outlines::{self, Surface};
@@ -14,6 +15,8 @@ use crate::vector::{Vector, along, cross, dot, sub, unit};
 use crate::view::View;
 use crate::{Rgb, threads};
 
+/// Sine of how high a light stands whose shadows on the floor are drawn: lower ones are longer than the picture.
+const LOWEST: f64 = 0.05;
 /// How far a vertex of a coarser mesh may be off [pixels].
 const ERROR: f32 = 0.4;
 
@@ -39,6 +42,8 @@ pub struct Shot<'a> {
     pub instances: &'a [Instance],
     /// Lines and dots on top, one over the other.
     pub lines: &'a [Line],
+    /// Lights of the scene; without any, fixed ones shine.
+    pub lamps: &'a [Lamp],
     /// Height of the floor and the distance of the lines on it [m].
     pub floor: Option<[f64; 2]>,
     /// What is behind everything, row by row from the top, and what the floor fades into; the sky if left out.
@@ -154,9 +159,14 @@ struct Stage<'a> {
 impl<'a> Stage<'a> {
     fn new(renderer: &'a Renderer, shot: &Shot<'a>, lens: &Lens, camera: [Vector; 3]) -> Stage<'a> {
         let view = shot.view;
-        let key = unit(KEY);
+        let caster = caster(shot.lamps, shot.middle);
+        let key = caster.map_or_else(|| unit(KEY), |(_, towards)| towards);
         // the light's picture: a square around what matters, as seen along the light
-        let side = unit(cross([0.0, 0.0, 1.0], key));
+        let side = match cross([0.0, 0.0, 1.0], key) {
+            // straight from above, or from below
+            side if dot(side, side) < 1e-12 => [1.0, 0.0, 0.0],
+            side => unit(side),
+        };
         let light_axes = [side, cross(key, side), key.map(|part| -part)];
         let centre = sub(shot.middle, view.eye);
         let scales = [1.0 / shot.reach, 1.0 / shot.reach, 1.0];
@@ -233,7 +243,9 @@ impl<'a> Stage<'a> {
             lights: Lights {
                 key: key.map(|part| part as f32),
                 fill: unit(fill).map(|part| part as f32),
+                lamps: Lamps::new(shot.lamps, view.eye, caster.map(|(place, _)| place)),
                 shadow,
+                floor_shadows: (shot.lamps.is_empty() || caster.is_some()) && key[2] > LOWEST,
                 ground,
             },
             marks: shot

@@ -1,13 +1,16 @@
-//! Light: a key light with shadows, a fill light from the camera's side, and a sky; a floor with a grid below.
+//! Light: a key light with shadows, a fill light from the camera's side, and a sky; a floor with a grid below. Lamps of a
+//! scene take the place of these lights.
 //!
 //! Colours are added up as light, whose square root is what a file holds, so that edges and translucent surfaces mix as
 //! they do to the eye.
 
 use crate::Rgb;
 use crate::cover::floor;
+use crate::lamps::Lamps;
 use crate::mesh::Face;
 use crate::rays::Ray;
 use crate::shadow::Shadow;
+use crate::single::{along, cross, dot, sub, unit};
 
 pub(crate) type Light = [f32; 3];
 
@@ -44,35 +47,6 @@ pub(crate) fn colour(light: Light) -> Rgb {
 
 pub(crate) fn mix(under: Light, over: Light, share: f32) -> Light {
     std::array::from_fn(|k| under[k] + (over[k] - under[k]) * share)
-}
-
-pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn along(a: [f32; 3], s: f32, b: [f32; 3]) -> [f32; 3] {
-    [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
-}
-
-fn unit(a: [f32; 3]) -> [f32; 3] {
-    let square = dot(a, a);
-    if square > 0.0 {
-        a.map(|part| part / square.sqrt())
-    } else {
-        a
-    }
 }
 
 /// How a placed mesh is looked at and coloured.
@@ -116,7 +90,10 @@ pub(crate) struct Ground {
 pub(crate) struct Lights {
     pub key: [f32; 3],
     pub fill: [f32; 3],
+    pub lamps: Lamps,
     pub shadow: Shadow,
+    /// Whether what lies flat has shadows: some light casts them, from above.
+    pub floor_shadows: bool,
     pub ground: Option<Ground>,
 }
 
@@ -164,7 +141,14 @@ impl Lights {
         let [red, green, blue, opacity] = face.colour;
         let surface_light = mix(light([red, green, blue]), look.tint, look.tinted);
         let opacity = look.opacity * f32::from(opacity) / 255.0;
-        (self.lit(surface_light, normal, flat, point, ray), opacity)
+        let lit = if self.lamps.shine() {
+            let normals = [normal, flat];
+            let shadow = &self.shadow;
+            self.lamps.lit(surface_light, normals, point, ray, shadow)
+        } else {
+            self.lit(surface_light, normal, flat, point, ray)
+        };
+        (lit, opacity)
     }
 
     fn lit(
@@ -245,7 +229,11 @@ impl Lights {
             colour = mix(colour, line, 0.8 * cover);
         }
         let at = [point[0], point[1], ground.height];
-        let shadow = self.shadow.light(at, [0.0, 0.0, 1.0]);
+        let shadow = if self.floor_shadows {
+            self.shadow.light(at, [0.0, 0.0, 1.0])
+        } else {
+            1.0
+        };
         let lit = colour.map(|part| part * (0.52 + 0.48 * shadow));
         mix(behind, lit, left)
     }

@@ -1,6 +1,7 @@
 //! Pictures against geometry that can be worked out by hand.
 
 mod cover;
+mod lamps;
 mod light;
 mod normals;
 mod pieces;
@@ -67,6 +68,7 @@ fn shot(instances: &[Instance]) -> Shot<'_> {
         view: view(),
         instances,
         lines: &[],
+        lamps: &[],
         floor: None,
         backdrop: None,
         outlines: false,

@@ -71,6 +71,7 @@ impl Solids {
             view: *view,
             instances: &self.instances,
             lines: &[],
+            lamps: &[],
             floor,
             backdrop: Some(&backdrop.pixels),
             outlines: true,
