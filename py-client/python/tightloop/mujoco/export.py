@@ -61,6 +61,9 @@ _ARRAYS = """
     key_time key_qpos key_qvel key_act key_ctrl key_mpos key_mquat
     cam_bodyid cam_pos cam_quat cam_targetbodyid cam_pos0 cam_poscom0 cam_mat0 cam_fovy cam_resolution cam_sensorsize
     cam_intrinsic geom_group geom_matid geom_rgba mat_rgba site_size site_group site_matid site_rgba
+    tendon_width tendon_group tendon_matid tendon_rgba
+    light_bodyid light_targetbodyid light_pos light_dir light_pos0 light_poscom0 light_dir0 light_active
+    light_castshadow light_attenuation light_cutoff light_exponent light_ambient light_diffuse light_specular
     sensor_adr sensor_dim sensor_objid sensor_refid sensor_cutoff
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
@@ -85,6 +88,8 @@ _KINDS = {
     "actuator_biastype": "mjtBias",
     "site_type": "mjtGeom",
     "cam_mode": "mjtCamLight",
+    "light_mode": "mjtCamLight",
+    "light_type": "mjtLightType",
     "sensor_type": "mjtSensor",
     "sensor_datatype": "mjtDataType",
     "sensor_objtype": "mjtObj",
@@ -111,6 +116,11 @@ _REAL_OPTIONS = (
 #: Options that count where the flag ``mjENBL_OVERRIDE`` is set.
 _OVERRIDE_OPTIONS = ("o_margin", "o_solref", "o_solimp", "o_friction")
 _COUNT_OPTIONS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "disableactuator")
+# Parts of `MjVisual`: the light at the camera, and colours of muscles.
+_LOOKS = (
+    *(("headlight", name) for name in ("active", "ambient", "diffuse", "specular")),
+    *(("rgba", name) for name in ("actuator", "actuatorpositive")),
+)
 _COUNTS = ("nflex", "nplugin", "npair", "nmocap", "nsensor", "nsensordata")
 
 
@@ -201,6 +211,8 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
     flags = [*_flags(mujoco.mjtDisableBit, model.opt.disableflags), *_flags(mujoco.mjtEnableBit, model.opt.enableflags)]
     found["opt.flags"] = as_bytes(flags)
     found["stat.meaninertia"] = np.array([model.stat.meaninertia])
+    for part, name in _LOOKS:
+        found[f"vis.{part}.{name}"] = np.array(getattr(getattr(model.vis, part), name), np.float64).reshape(-1)
     for name in _COUNTS:
         found[name] = np.array([getattr(model, name)], np.int32)
     return found
