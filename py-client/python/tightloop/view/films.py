@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tightloop.view.html import Html
 
 #: Frame fields of a film.
-FIELDS = ("body_q", "contact_count", "contact_pos", "contact_force")
+FIELDS = ("body_q", "act", "contact_count", "contact_pos", "contact_force")
 #: Default length of a film of a daemon [s].
 LIVE_SECONDS = 5.0
 # A paused daemon publishes its state only once.

@@ -15,11 +15,13 @@ from tightloop.view.browser import guarded_server
 from tightloop.view.browser.display_options import DisplayOptions, Kind
 from tightloop.view.browser.gate import Gate
 from tightloop.view.browser.overlay import Overlay
+from tightloop.view.browser.stage import Lamps
 from tightloop.view.cameras import Camera, camera
 from tightloop.view.meshes.contact_marks import WORLDS_MAX
 from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import Parts
 from tightloop.view.source import CONTACT_FIELDS
+from tightloop.view.tendons.batched import TendonMeshes
 from tightloop.whole_files import whole_file
 
 # Aspect ratio assumed for the browser's window, which is not known yet.
@@ -56,17 +58,22 @@ class Html:
         # viser records only what a server shows; nobody gets the token of this one
         self._server = guarded_server.start(Gate("127.0.0.1"), "127.0.0.1", 0)
         self._world_meshes: WorldMeshes | None = None
+        self._tendons: TendonMeshes | None = None
+        self._lamps: Lamps | None = None
         self._overlay: Overlay | None = None
         self._serializer: Any = None
 
     def add(self, shown: Any, chosen: Sequence[int]) -> None:
         """Add a frame of the chosen worlds."""
-        there = [name for name in ("body_q", "status", *CONTACT_FIELDS) if hasattr(shown, name)]
+        there = [name for name in ("body_q", "act", "status", *CONTACT_FIELDS) if hasattr(shown, name)]
         own = SimpleNamespace(**{name: np.asarray(getattr(shown, name))[list(chosen)] for name in there})
         if self._world_meshes is None:
             self._begin(own.body_q)
-        assert self._world_meshes is not None and self._overlay is not None
+        assert self._world_meshes is not None and self._tendons is not None and self._overlay is not None
         self._world_meshes.show(own.body_q, getattr(own, "status", np.zeros(len(own.body_q), int)))
+        if self._lamps is not None:
+            self._lamps.show(own.body_q[0])
+        self._tendons.show(own, range(len(own.body_q)), self._world_meshes.offsets)
         if all(hasattr(own, name) for name in CONTACT_FIELDS):
             self._overlay.show_contacts(own, range(len(own.body_q)))
         if self._serializer is None:
@@ -92,7 +99,13 @@ class Html:
         shows = len(body_q) <= WORLDS_MAX if self._contacts is None else self._contacts
         self._options.choose(contacts="all worlds" if shows else "off")
         self._world_meshes = WorldMeshes(self._server, self._parts, len(body_q), self._options, body_q[0])
+        self._tendons = TendonMeshes(self._server, self._parts.tendons, self._options)
         self._overlay = Overlay(self._server, self._parts, self._options, self._world_meshes, bodies=self._bodies)
+        if len(self._parts.lights):
+            scene.configure_environment_map(None)
+            scene.configure_default_lights(False)
+            middle = self._world_meshes.box.mean(axis=0)
+            self._lamps = Lamps(scene, self._parts.lights, middle, far=len(body_q) > 1)
         scene.set_up_direction("+z")
         ground = self._world_meshes.ground
         scene.add_grid(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal
@@ -20,10 +20,13 @@ from numpy.typing import NDArray
 
 from tightloop import _core
 from tightloop.errors import SceneError
+from tightloop.view import models
+from tightloop.view.lights import Lights
 from tightloop.view.meshes import paint, sheets
 from tightloop.view.meshes import visual as visual_mesh
 from tightloop.view.meshes.visual import VisualMesh
 from tightloop.view.subject import Subject, subject
+from tightloop.view.tendons.paths import Tendons
 
 # Most files in a note.
 _LISTED_MAX = 8
@@ -79,11 +82,15 @@ class Parts:
         parts: All parts, the world's first.
         notes: What could not be shown as its file has it, a sentence each.
         subject: The bodies that cameras frame and follow.
+        tendons: Spatial tendons of MuJoCo models.
+        lights: Lights of MuJoCo models.
     """
 
     parts: list[Part]
     notes: list[str]
     subject: Subject
+    tendons: Tendons = field(default_factory=Tendons)
+    lights: Lights = field(default_factory=Lights)
 
     def __iter__(self) -> Iterator[Part]:
         return iter(self.parts)
@@ -112,7 +119,8 @@ def parts(scene_toml: str, folder: str | PathLike[str], body_names: Sequence[str
     told = json.loads(text)
     assembly = _Assembly(surfaces, body_names)
     made, own_notes = assembly.whole(told["parts"], told["notes"])
-    return Parts(made, own_notes, subject(scene_toml, folder, body_names))
+    tendons, lights = models.extras(scene_toml, folder, body_names)
+    return Parts(made, own_notes, subject(scene_toml, folder, body_names), tendons, lights)
 
 
 class _Assembly:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from tightloop.arrays.frames import FAULTED
 from tightloop.checks import arguments as checks
 from tightloop.checks.signatures import checked_calls
 from tightloop.errors import ArgumentError
-from tightloop.view import cameras
+from tightloop.view import cameras, lights
 from tightloop.view.arguments import check_camera, check_contacts
 from tightloop.view.cameras import Camera
 from tightloop.view.framing import Framing
@@ -25,6 +26,7 @@ from tightloop.view.parts import Mesh, Part, Parts
 from tightloop.view.poses import Array, compose
 from tightloop.view.source import CONTACT_FIELDS
 from tightloop.view.subject import whole
+from tightloop.view.tendons.drawn import DrawnTendons
 
 _RED = (225, 40, 40, 180)
 _GHOST = (60, 170, 240, 190)
@@ -81,6 +83,10 @@ class Picture:
         every = list(parts)
         bodies = 1 + max((part.body for part in every), default=-1)
         self._subject = parts.subject if isinstance(parts, Parts) else whole(bodies)
+        self._lights = parts.lights if isinstance(parts, Parts) else lights.Lights()
+        # as sites, tendons are no part of what touches
+        has_tendons = isinstance(parts, Parts) and kind == "visual" and len(parts.tendons) > 0
+        self._tendons = DrawnTendons(parts.tendons) if isinstance(parts, Parts) and has_tendons else None
         own = [part for part in every if part.kind == kind]
         # a floor is drawn as infinite; a slope is drawn as its mesh
         self._floors = [part for part in own if floor.is_floor(part)]
@@ -131,7 +137,7 @@ class Picture:
 
         Args:
             shown: A frame with ``body_q``. With ``status``, faulted worlds are red. With ``contact_count``,
-                ``contact_pos`` and ``contact_force``, contacts are drawn.
+                ``contact_pos`` and ``contact_force``, contacts are drawn. With ``act``, muscles are coloured.
             worlds: How many worlds are drawn on a grid, the first ones; or a list of them. All if left out. With a
                 height field wider than 4 m they are drawn in place, on one ground.
             camera: A preset, ``"three-quarter"``, ``"front"``, ``"side"``, ``"top"`` or ``"follow"``, which follows
@@ -177,7 +183,12 @@ class Picture:
             kept = np.tile(~still, len(chosen))
             kept[: len(still)] = True
             meshes, poses, tints = meshes[kept], poses[kept], tints[kept]
-        layers = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
+        layers: list[tuple[Any, ...]] = [(meshes, poses, tints, np.ones(len(meshes), np.float32))]
+        if self._tendons is not None:
+            act = _field(shown, "act")
+            red = np.where(faulted[:, None] > 0, _RED, _PLAIN)
+            own = None if act is None else np.asarray(act)[chosen]
+            layers.append(self._tendons.layer(body_q[chosen], own, offsets, red, add=self._add))
         if ghost is not None:
             layers.append(self._ghost(np.asarray(ghost, float), offsets[place]))
         aims = [np.zeros((0, 3))]
@@ -189,6 +200,7 @@ class Picture:
         shows = len(chosen) <= WORLDS_MAX if contacts is None else contacts
         lines = self._contacts(shown, chosen, view) if shows else _no_lines()
         meshes, poses, tints, opacities = (np.concatenate(column) for column in zip(*layers, strict=True))
+        lamps = self._lamps(view, body_q[chosen[place]], offsets[place], None if len(chosen) == 1 else box.mean(axis=0))
         return self._renderer.render(
             (view.position, view.target, view.up),
             view.fov,
@@ -199,7 +211,18 @@ class Picture:
             tints,
             opacities,
             *lines,
+            **({"lamps": lamps} if len(lamps) else {}),
         )
+
+    def _lamps(self, view: Camera, body_q: Array, offset: Array, middle: Array | None) -> NDArray[np.float64]:
+        """Return the lights of models in a world; from far off where its middle is given, since there are others."""
+        if not len(self._lights):
+            return lights.rows([])
+        lamps = self._lights.lamps(body_q)
+        if middle is not None:
+            lamps = [lamp.far(middle) for lamp in lamps]
+        lamps = [lamp if lamp.position is None else replace(lamp, position=lamp.position + offset) for lamp in lamps]
+        return lights.rows([*lamps, *self._lights.headlight(np.subtract(view.target, view.position))])
 
     def _add(self, mesh: Mesh, *, flat: bool = False) -> int:
         return self._renderer.add(

@@ -19,7 +19,7 @@ _EVERY_OTHER_SECONDS = 0.036
 # Without a page open, the daemon is checked this often.
 _THERE_SECONDS = 1.0
 #: Fields of every frame; contacts and plots ask for more.
-FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q")
+FIELDS = ("body_q", "body_qd", "joint_q", "joint_target_q", "act")
 
 
 class LiveStream:

@@ -26,6 +26,7 @@ from tightloop.view.meshes.worlds import WorldMeshes
 from tightloop.view.parts import parts
 from tightloop.view.poses import Array
 from tightloop.view.source import CONTACT_FIELDS
+from tightloop.view.tendons.batched import TendonMeshes
 
 # Cameras are re-aimed this often; the points of many worlds take longer to find.
 _KEEP_SECONDS, _KEEP_MANY_SECONDS = 0.03, 0.25
@@ -57,6 +58,7 @@ class Page:
         self._dynamics, self._driven = _dynamics(info, notes)
         body_q = np.asarray(first.body_q)
         self._world_meshes = WorldMeshes(server, scene_parts, stream.worlds, self.options, body_q[0])
+        self._tendons = TendonMeshes(server, scene_parts.tendons, self.options)
         self._overlay = Overlay(
             server, scene_parts.parts, self.options, self._world_meshes, bodies=len(info["body_names"])
         )
@@ -78,7 +80,13 @@ class Page:
         box = self._world_meshes.box
         ground = self._world_meshes.ground
         height = floor.height(scene_parts, box, ground)
-        add_stage(server.scene, box if ground is None else ground, self._world_meshes.offsets, height)
+        self._lamps = add_stage(
+            server.scene,
+            box if ground is None else ground,
+            self._world_meshes.offsets,
+            height,
+            lights=scene_parts.lights,
+        )
         self.show(first, new=True)
 
     def update(self, timeout: float) -> float | None:
@@ -119,6 +127,8 @@ class Page:
         body_q, world = np.asarray(shown.body_q), self.options.world
         with self._server.atomic():
             self._world_meshes.show(body_q, np.asarray(shown.status))
+            self._tendons.show(shown, self._world_meshes.shown(len(body_q)), self._world_meshes.offsets)
+            self._lamps.show(body_q[world])
             self._overlay.show_axes(body_q)
             self._overlay.show_ghost(self._ghost(shown, world))
             if all(hasattr(shown, field) for field in CONTACT_FIELDS):

@@ -1,4 +1,4 @@
-"""Write the models of the tests of MuJoCo's stages: ``python sim-core/stages/recorded/tests/record_stages/export_models.py``."""
+"""Write the models of the tests of MuJoCo's stages: ``python`` with the path of this file."""
 
 from __future__ import annotations
 
