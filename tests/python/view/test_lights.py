@@ -17,6 +17,7 @@ from tightloop.view.browser.gate import Gate
 from tightloop.view.browser.stage import add_stage
 from tightloop.view.lights import COLUMNS, Lights, rows
 from tightloop.view.parts import Parts, parts
+from tightloop.view.poses import IDENTITY
 
 XML = """<mujoco model="lit"><visual><headlight {head}/></visual><worldbody>{lights}
 <geom name="table" type="box" size="1 1 .1" rgba=".8 .8 .8 1"/>
@@ -140,10 +141,27 @@ def test_worlds_side_by_side_are_lit_alike():
     np.testing.assert_allclose(*colors, atol=2)
 
 
+def test_the_light_of_the_page_that_casts_shadows_shines_from_far_off():
+    model, lights = lit('<light pos="0 1 3" dir="0 0 -1"/>'), Lights()
+    lights.add(export.arrays(model), range(model.nbody))
+    server = guarded_server.start(Gate("127.0.0.1"), "127.0.0.1", 0)
+    try:
+        box = np.array([[-1, -1, 0], [1, 1, 2.0]])
+        lamps = add_stage(server.scene, box, np.zeros((1, 3)), 0.0, lights=lights)
+        lamps.show(np.tile(IDENTITY, (model.nbody, 1)))
+        (handle,) = lamps._handles
+        assert handle.cast_shadow
+        # from above the middle of the box
+        np.testing.assert_allclose(handle.position, np.array([0, 1, 2]) / np.sqrt(5))
+    finally:
+        server.stop()
+
+
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_the_page_has_the_lights_of_a_model(worlds):
-    spot = '<light name="spot" pos="1 2 3" dir="0 1 -1" cutoff="30"/><light type="point" pos="0 0 4"/>'
-    model = lit(spot + ABOVE.format(more=""), carried='<light pos="0 0 1"/>')
+    spot = '<light pos="1 2 3" dir="0 1 -1" cutoff="30" castshadow="false"/>'
+    point = '<light type="point" pos="0 0 4" castshadow="false"/>'
+    model = lit(spot + point + ABOVE.format(more=""), carried='<light pos="0 0 1"/>')
     data, lights = mujoco.MjData(model), Lights()
     lights.add(export.arrays(model), range(model.nbody))
     mujoco.mj_forward(model, data)

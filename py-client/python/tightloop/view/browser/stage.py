@@ -78,7 +78,8 @@ class Lamps:
     """The lights of MuJoCo models in the browser, in place of the fixed ones.
 
     A browser adds light up where MuJoCo adds up bytes of colours. So the sum over all lights is about MuJoCo's where
-    all of them shine. The light at the camera comes from everywhere.
+    all of them shine. The light at the camera comes from everywhere. The first light that casts shadows shines from far
+    off: shadows of others have speckles in browsers.
 
     Args:
         scene: The scene of the page.
@@ -94,8 +95,8 @@ class Lamps:
     def show(self, body_q: Array) -> None:
         """Move the lights to where they are in a world, whose bodies have these poses, shape ``(bodies, 7)``."""
         lamps = self._lights.lamps(body_q) if len(self._lights) else []
-        if self._far:
-            lamps = [lamp.far(self._middle) for lamp in lamps]
+        caster = next((number for number, lamp in enumerate(lamps) if lamp.shadows), None)
+        lamps = [lamp.far(self._middle) if self._far or number == caster else lamp for number, lamp in enumerate(lamps)]
         if lamps and not self._handles:
             self._add(lamps)
         for handle, lamp in zip(self._handles, lamps, strict=True):
@@ -115,17 +116,18 @@ class Lamps:
         whole = min(float(np.max(ambient + np.sum([lamp.diffuse for lamp in lamps], axis=0))), 1.0)
         color, intensity = _shining(ambient * whole)
         self._scene.add_light_ambient("/light/ambient", color=color, intensity=intensity)
+        casts = False
         for number, lamp in enumerate(lamps):
             color, intensity = _shining(lamp.diffuse * whole)
-            name, shadows = f"/light/{number}", lamp.shadows and not self._handles
+            name = f"/light/{number}"
             if lamp.position is None:
+                shadows = lamp.shadows and not casts
+                casts = casts or shadows
                 handle: Any = self._scene.add_light_directional(
                     name, color=color, intensity=intensity, cast_shadow=shadows
                 )
             elif lamp.cutoff > 0.5 * math.pi:
-                handle = self._scene.add_light_point(
-                    name, color=color, intensity=intensity, decay=0.0, cast_shadow=shadows
-                )
+                handle = self._scene.add_light_point(name, color=color, intensity=intensity, decay=0.0)
             else:
                 handle = self._scene.add_light_spot(
                     name,
@@ -134,7 +136,6 @@ class Lamps:
                     decay=0.0,
                     angle=lamp.cutoff,
                     penumbra=min(lamp.exponent / 10.0, 1.0),
-                    cast_shadow=shadows,
                 )
             self._handles.append(handle)
 
