@@ -356,7 +356,7 @@ impl Case {
             block.joint_f[j] = number(30.0);
             block.joint_target_qd[j] = number(1.0);
         }
-        for x in &mut block.ctrl {
+        for x in block.ctrl.iter_mut().chain(&mut block.control_history) {
             *x = number(2.0);
         }
         for (x, (param, start)) in block.params.iter_mut().zip(m.varying.starts()) {

@@ -310,7 +310,10 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
     // state and commands of a world, its counters; see backend/cpu/chunk.rs
     worlds
         .saturating_mul(
-            ((5 + 3 * m.delay.frames) * model.dofs() + 2 * model.coords() + m.varying.len()) as u64
+            ((5 + 3 * m.delay.frames) * model.dofs()
+                + 2 * model.coords()
+                + m.actuators.kept_controls()
+                + m.varying.len()) as u64
                 * real
                 + 45,
         )

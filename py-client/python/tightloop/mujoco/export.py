@@ -70,7 +70,7 @@ _ARRAYS = """
 _NEWER_ARRAYS = """
     jnt_stiffnesspoly jnt_springyield dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature
     tendon_dampingpoly tendon_stiffnesspoly tendon_springyield pair_adhesion tendon_actfrclimited tendon_actfrcrange
-    actuator_delay actuator_armature actuator_damping
+    actuator_delay actuator_history actuator_armature actuator_damping
     actuator_dampingpoly jnt_actuatorid tendon_actuatorid actuator_ctrlnum actuator_ctrlspec
     actuator_outnum site_dataid mesh_pos mesh_quat
     sensor_delay sensor_interval sensor_intprm

@@ -8,7 +8,7 @@ use sim_physics::step::StageId;
 
 /// The arrays of a record in their order, which is that of a snapshot's file: arrays with an entry for each dof first, the
 /// parameters last.
-pub(in crate::backend) const RECORD: [Array; 14] = [
+pub(in crate::backend) const RECORD: [Array; 15] = [
     Array::JointQd,
     Array::JointQdd,
     Array::JointF,
@@ -17,6 +17,7 @@ pub(in crate::backend) const RECORD: [Array; 14] = [
     Array::JointQ,
     Array::JointQRest,
     Array::Act,
+    Array::ControlHistory,
     Array::CommandHistory,
     Array::Ctrl,
     Array::MocapPos,

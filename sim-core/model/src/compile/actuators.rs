@@ -4,12 +4,14 @@ use super::carrier::Carrier;
 use super::contacts::clusters::path;
 use super::sites::mounted;
 use super::tendons::Lengths;
-use crate::description::{self, ActuatorActivation, ActuatorLength, Precompiled};
+use crate::description::{
+    self, ActuatorActivation, ActuatorDelay, ActuatorLength, Interpolation, Precompiled,
+};
 use crate::pose::Pose;
 use sim_physics::constants::Body;
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, Actuators, Adhesion, LengthKind, Sites, SliderCrank,
-    TendonBound, TurningLength,
+    Activation, ActivationRate, Actuator, Actuators, Adhesion, ControlDelay, LengthKind, Sites,
+    SliderCrank, TendonBound, TurningLength,
 };
 use sim_physics::constants::lengths::Term;
 use sim_physics::constants::site::Mount;
@@ -40,10 +42,14 @@ pub(super) fn add(to: &mut Actuators<f64>, actuator: &description::Actuator, sce
         to.activations += 1;
         activation(&described, place, scene.dt)
     });
+    let delay = actuator
+        .delay
+        .map(|described| delay(&described, to, scene.dt));
     to.all.push(Actuator {
         terms,
         turning,
         activation,
+        delay,
         ctrl_range: actuator.ctrl_range,
         force_range: actuator.force_range,
         gain: actuator.gain,
@@ -86,6 +92,62 @@ fn activation(activation: &ActuatorActivation, place: usize, dt: f64) -> Activat
         },
         range: activation.range,
         early: activation.early,
+    }
+}
+
+/// The weights of earlier controls, after the delays before it.
+fn delay(described: &ActuatorDelay, before: &Actuators<f64>, dt: f64) -> ControlDelay<f64> {
+    // how old what acts is at the start, in the middle and at the end of a step [steps]
+    let ages = [0.0, 0.5, 1.0].map(|moment| described.seconds / dt - moment);
+    let shares = ages.map(|age| shares(described, age));
+    let steps = shares.iter().flatten().map(|(age, _)| *age).max();
+    let steps = steps.expect("a control acts");
+    ControlDelay {
+        place: before.delays().count(),
+        first: before.kept_controls(),
+        steps,
+        weights: shares.map(|shares| {
+            let mut weights = vec![0.0; steps];
+            for (age, share) in shares {
+                weights[age - 1] += share;
+            }
+            weights
+        }),
+    }
+}
+
+/// How near an age is to a whole number of steps that it counts as [steps].
+const WHOLE: f64 = 1e-9;
+
+/// What acts after `age` steps: controls of a number of steps ago, each with its share (MuJoCo: `mj_readCtrl`).
+fn shares(described: &ActuatorDelay, age: f64) -> Vec<(usize, f64)> {
+    let oldest = described.samples;
+    let nearest = age.round().clamp(1.0, oldest as f64);
+    // at a control, or beyond the first or the last one
+    if age <= 1.0 || age >= oldest as f64 || (age - nearest).abs() < WHOLE {
+        return vec![(nearest as usize, 1.0)];
+    }
+    // between two controls, and how far from the earlier one [steps]
+    let (earlier, later) = (age.ceil() as usize, age.ceil() as usize - 1);
+    let x = age.ceil() - age;
+    match described.interpolation {
+        Interpolation::Hold => vec![(earlier, 1.0)],
+        Interpolation::Line => vec![(earlier, 1.0 - x), (later, x)],
+        Interpolation::Spline => {
+            // Hermite's polynomials of the values and of the slopes
+            let (square, cube) = (x * x, x * x * x);
+            let value = 3.0 * square - 2.0 * cube;
+            let slopes = [cube - 2.0 * square + x, cube - square];
+            let mut shares = vec![(earlier, 1.0 - value), (later, value)];
+            // half the difference of the neighbours, where both are kept
+            if earlier < oldest {
+                shares.extend([(later, slopes[0] / 2.0), (earlier + 1, -slopes[0] / 2.0)]);
+            }
+            if later > 1 {
+                shares.extend([(later - 1, slopes[1] / 2.0), (earlier, -slopes[1] / 2.0)]);
+            }
+            shares
+        }
     }
 }
 

@@ -25,8 +25,8 @@ pub use joint::{Joint, JointDof, Mimic, TargetMode};
 pub use output_frames::{FrameParts, Inertia, OnLink};
 pub use param_draws::ParamDraw;
 pub use precompiled::{
-    Actuator, ActuatorActivation, ActuatorLength, Compensator, ContactPair, Drag, EllipsoidInFluid,
-    JointExtras, Keyframe, Precompiled,
+    Actuator, ActuatorActivation, ActuatorDelay, ActuatorLength, Compensator, ContactPair, Drag,
+    EllipsoidInFluid, Interpolation, JointExtras, Keyframe, Precompiled,
 };
 pub(crate) use robot::BODY_LINK;
 pub use robot::{Collision, Link, Robot};

@@ -193,6 +193,8 @@ pub struct Actuator {
     pub length: ActuatorLength,
     /// What its control drives, if that is not its force.
     pub activation: Option<ActuatorActivation>,
+    /// How late its control acts, if not at once.
+    pub delay: Option<ActuatorDelay>,
     /// Bounds of its control.
     pub ctrl_range: Option<[f64; 2]>,
     /// Bounds of its force [N or N·m].
@@ -264,6 +266,28 @@ pub enum ActuatorLength {
         /// The link.
         link: usize,
     },
+}
+
+/// How late the control of an actuator acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActuatorDelay {
+    /// How long it takes [s]; at least a step.
+    pub seconds: f64,
+    /// How many earlier controls are kept, at least 1. The oldest one stands for those before it.
+    pub samples: usize,
+    /// What acts between two controls.
+    pub interpolation: Interpolation,
+}
+
+/// What acts between two controls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The earlier one.
+    Hold,
+    /// A line from the one to the other.
+    Line,
+    /// A cubic Hermite spline, whose slopes are those between the controls before and after. At the ends they are 0.
+    Spline,
 }
 
 /// The state of an actuator.

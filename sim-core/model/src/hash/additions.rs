@@ -3,8 +3,8 @@
 //! The first release kept these constants together, for models from MuJoCo alone.
 
 use sim_physics::constants::actuators::{
-    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, Adhesion, LengthKind, Motor,
-    Muscle, MuscleRate, Sites, SliderCrank, TendonBound, TurningLength,
+    Activation, ActivationRate, Actuator, ActuatorBound, Actuators, Adhesion, ControlDelay,
+    LengthKind, Motor, Muscle, MuscleRate, Sites, SliderCrank, TendonBound, TurningLength,
 };
 use sim_physics::constants::contact::{PairImpedances, TouchedBodies};
 use sim_physics::constants::lengths::{Length, Term};
@@ -237,7 +237,10 @@ view! {
             "bias": bias,
         }
         Later { "muscle_gain": muscle_gain, "muscle_bias": muscle_bias }
-        Later { "motor": motor };
+        Later { "motor": motor }
+        Later { "delay": delay };
+    ControlDelay<f64> as "ControlDelay":
+        Always { "place": place, "first": first, "steps": steps, "weights": weights };
     Motor<f64> as "Motor":
         Always {
             "constant": constant,

@@ -16,7 +16,6 @@ use crate::softness::POWER_MAX;
 const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
     ("joint", "jnt_springyield", "plastic springs"),
     ("tendon", "tendon_springyield", "plastic springs"),
-    ("actuator", "actuator_delay", "a delay"),
 ];
 
 /// Flags of `<option>` that are supported. All others are refused, also those that a newer MuJoCo brings.

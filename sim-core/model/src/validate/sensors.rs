@@ -1,4 +1,4 @@
-//! Checks of sites, contact sensors and the delay of commands.
+//! Checks of sites, contact sensors and delays of commands.
 
 use super::shape::pose;
 use crate::description::{Description, named};
@@ -8,6 +8,8 @@ use crate::value_checks::{count, in_range, name, positive, unique};
 
 /// Largest delay of commands [control frames].
 const DELAY_FRAMES_MAX: usize = 1000;
+/// Most controls that an actuator keeps: each step moves all of them.
+const KEPT_CONTROLS_MAX: usize = 256;
 /// Most rays of a height scan along an axis.
 const SCAN_MAX: usize = 1000;
 /// Least and most damping of an inverse Jacobian [m and rad alike]: its square stays within `f32`, and so does what it is added to.
@@ -65,6 +67,27 @@ impl Description {
                 DELAY_FRAMES_MAX * self.substeps,
                 rule,
             )?;
+        }
+        self.validate_actuator_delays()
+    }
+
+    /// Refuses delays of actuators that are many steps long.
+    fn validate_actuator_delays(&self) -> Result<(), ModelError> {
+        for robot in &self.robots {
+            let parts = robot.precompiled.iter();
+            for actuator in parts.flat_map(|parts| &parts.actuators) {
+                let Some(delay) = &actuator.delay else {
+                    continue;
+                };
+                let (robot, actuator) = (&robot.name, &actuator.name);
+                let what =
+                    format!("robot `{robot}`: actuator `{actuator}`: number of steps of its delay");
+                let steps = (delay.seconds / self.dt).ceil().max(1.0);
+                let rule = "give at most 256, with a shorter delay or a longer time step";
+                // the oldest control that is kept stands for those before it
+                let is_short = (steps as usize).min(delay.samples) <= KEPT_CONTROLS_MAX;
+                in_range(&what, steps, is_short, rule)?;
+            }
         }
         Ok(())
     }

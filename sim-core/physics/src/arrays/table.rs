@@ -64,6 +64,8 @@ arrays! { m;
             => "joint_qdd" Derived [Dofs], "Joint accelerations under the commands held, constraints included.";
         act: Act [m.actuators.activations] Motion "–"
             => "act" State [Activations], "Activations of the actuators that have one, in their order, as MuJoCo's `act`.";
+        // controls of the last steps of actuators with a delay, see `ControlDelay::first`
+        control_history: ControlHistory [m.actuators.kept_controls()] Motion "–";
         // substeps since the start of the control frame
         substep: Substep [1] Counter "–";
         // 1 where the solver used up its iterations since this was cleared
@@ -154,6 +156,8 @@ arrays! { m;
             => "actuator_velocity" [Actuators], "How fast it changes.";
         actuator_force: ActuatorForce [Scalar; m.actuators.all.len()] Stage "N or N·m"
             => "actuator_force" [Actuators], "Force of each actuator along its length.";
+        // what actuators with a delay follow in place of `ctrl`, see `ControlDelay::place`
+        delayed_control: DelayedControl [Scalar; m.actuators.delays().count()] Stage "–";
         act_dot: ActDot [Scalar; m.actuators.activations] Stage "1/s";
         // moments of turning lengths, see `TurningLength::first`
         actuator_moment: ActuatorMoment [Scalar; m.actuators.all.iter().filter_map(|actuator| actuator.turning.as_ref()).map(|length| length.dofs.len()).sum::<usize>()] Stage "–";

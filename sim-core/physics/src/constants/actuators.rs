@@ -24,6 +24,21 @@ recast! {
     }
 }
 
+impl<R> Actuators<R> {
+    /// Those that follow earlier controls, in their order.
+    #[inline(always)]
+    pub fn delays(&self) -> impl Iterator<Item = &ControlDelay<R>> {
+        self.all
+            .iter()
+            .filter_map(|actuator| actuator.delay.as_ref())
+    }
+
+    /// How many earlier controls they keep.
+    pub fn kept_controls(&self) -> usize {
+        self.delays().map(|delay| delay.steps).sum()
+    }
+}
+
 impl<R> Default for Actuators<R> {
     fn default() -> Actuators<R> {
         Actuators {
@@ -47,6 +62,8 @@ recast! {
         pub turning: Option<TurningLength<R>>,
         /// What its control drives, if that is not its force.
         pub activation: Option<Activation<R>>,
+        /// Which earlier controls it follows, if not the one that is held.
+        pub delay: Option<ControlDelay<R>>,
         /// Bounds of its control, if it has any.
         pub ctrl_range: Option<[R; 2]>,
         /// Bounds of its force, if it has any [N or N·m].
@@ -61,6 +78,21 @@ recast! {
         pub muscle_bias: Option<Muscle<R>>,
         /// What a DC motor has besides, with gain and bias for its torque without inductance and bounds.
         pub motor: Option<Motor<R>>,
+    }
+}
+
+recast! {
+    /// The earlier controls that an actuator follows (MuJoCo: `delay`, `nsample` and `interp`).
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct ControlDelay<R> {
+        /// Its place in `delayed_control`.
+        pub place: usize,
+        /// Place in `control_history` of the control of the last step. Those of the steps before it follow.
+        pub first: usize,
+        /// How many are kept.
+        pub steps: usize,
+        /// Their weights at the start of a step, in its middle and at its end, from the control of the last step on.
+        pub weights: [Vec<R>; 3],
     }
 }
 

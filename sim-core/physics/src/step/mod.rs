@@ -25,6 +25,7 @@ macro_rules! every_stage {
     ($expand:ident $arguments:tt) => {
         $crate::$expand! { $arguments
             command              [forces::command::Commands]                 Once;
+            delays               [forces::delays::Delays]                    Once;
             // where bodies are, how they move, and their inertia in joint space
             kinematics           [tree::kinematics::Kinematics]              Both;
             bias                 [tree::bias::Bias]                          Both;

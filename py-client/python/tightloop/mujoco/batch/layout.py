@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tightloop.mujoco.batch.delays import refuse_delays
 from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[np.float64]
@@ -40,9 +41,13 @@ class StateLayout:
 
     Attributes:
         size: Numbers in a row.
+
+    Raises:
+        ArgumentError: An actuator has a delay.
     """
 
     def __init__(self, model: Any) -> None:
+        refuse_delays(model, "Batch")
         self._model = model
         data = mujoco.MjData(model)
         self._starts: dict[int, Array] = {}

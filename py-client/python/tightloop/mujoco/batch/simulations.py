@@ -51,7 +51,7 @@ class Batch(NamedViews):
         nstate: Numbers in a row of ``bind("state")``.
 
     Raises:
-        ArgumentError: An argument is not valid, or the model enables sleep.
+        ArgumentError: An argument is not valid, the model enables sleep, or an actuator has a delay.
         SceneError: The model has parts that tightloop does not support; the message names them.
     """
 

@@ -1,5 +1,6 @@
-//! Actuators of a model: their laws and activations.
+//! Actuators of a model: their laws, activations and delays.
 
+mod delays;
 pub(super) mod motors;
 pub(super) mod muscles;
 mod transmissions;
@@ -24,6 +25,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
     let (bias_kinds, biases) = laws(file, "bias", count)?;
     let muscles = Muscles::read(file, count)?;
     let motors = Motors::read(file, count)?;
+    let delays = delays::read(file, count)?;
     let clamps = !has_flag(file, "mjDSBL_CLAMPCTRL")?;
     let ctrl_ranges = ranges(file, "ctrl", count)?;
     let force_ranges = ranges(file, "force", count)?;
@@ -40,6 +42,7 @@ pub(super) fn add_actuators(file: &ModelFile, robot: &mut Robot) -> Result<(), M
             name: names[k].clone(),
             length,
             activation: activations.activation(k, is_on, acts),
+            delay: delays[k].filter(|_| is_on),
             ctrl_range: ctrl_ranges[k].filter(|_| clamps),
             force_range: force_ranges[k].filter(|_| is_on),
             gain: on(match (motor_laws, gain_kinds[k].as_str()) {

@@ -7,8 +7,9 @@
 //! smooth += clamp(Σ c force)                                            over the actuators of a dof
 //! ```
 //!
-//! DC motors have more ([`super::motors`]). Where a tendon bounds the sum of its actuators' forces, each is scaled by what keeps
-//! the sum in its range, before it is clamped. The derivatives of forces with velocity are those before that, as MuJoCo's.
+//! DC motors have more ([`super::motors`]), and some controls act late ([`super::delays`]). Where a tendon bounds the sum of its
+//! actuators' forces, each is scaled by what keeps the sum in its range, before it is clamped. The derivatives of forces with
+//! velocity are those before that, as MuJoCo's.
 
 use super::transmission::measure;
 use super::{motors, muscles};
@@ -28,6 +29,7 @@ impl Stage for Actuators {
         A::JointQ,
         A::JointQd,
         A::Ctrl,
+        A::DelayedControl,
         A::Act,
         A::Params,
         A::Rotation,
@@ -149,10 +151,14 @@ fn tendon_scale<C: Cx>(
     C::F::select(acts, within.div(C::F::select(acts, sum, one)), one)
 }
 
-/// The control of actuator `k`, in its range.
+/// The control that actuator `k` follows, in its range.
 #[inline(always)]
 fn control<F: Num, V>(b: &crate::arrays::Block<F, V>, actuator: &Actuator<F::Real>, k: usize) -> F {
-    bounded(b.ctrl[k], actuator.ctrl_range)
+    let control = match &actuator.delay {
+        Some(delay) => b.work.delayed_control[delay.place],
+        None => b.ctrl[k],
+    };
+    bounded(control, actuator.ctrl_range)
 }
 
 /// How fast an activation changes.

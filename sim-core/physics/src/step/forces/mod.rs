@@ -8,6 +8,7 @@
 //! | `adhesion` | actuators that pull bodies to what they touch |
 //! | `contact_adhesion` | contacts that pull, since their shapes adhere |
 //! | `damping` | damping of actuators and tendons in an implicit step |
+//! | `delays` | earlier controls that actuators follow |
 //! | `motors` | DC motors: voltage, current, cogging |
 //! | `muscles` | gain, bias and activation of muscles |
 //! | `springs` | springs and dampers of joints and tendons |
@@ -23,6 +24,7 @@ pub mod command;
 pub mod contact_adhesion;
 pub(in crate::step) mod curves;
 pub mod damping;
+pub mod delays;
 pub mod ellipsoid_fluid;
 pub mod fluid;
 pub mod gravity_compensation;

@@ -31,6 +31,8 @@ impl Stage for Implicit {
     const READS: &'static [A] = &[
         A::Params,
         A::Ctrl,
+        A::ControlHistory,
+        A::DelayedControl,
         A::Act,
         A::ActDot,
         A::ActuatorMoment,
@@ -60,6 +62,7 @@ impl Stage for Implicit {
         A::JointQd,
         A::JointQdd,
         A::Act,
+        A::ControlHistory,
         A::MassMatrix,
     ];
 

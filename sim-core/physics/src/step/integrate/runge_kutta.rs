@@ -17,6 +17,7 @@ use crate::lane::{Cx, Num, Real};
 use crate::math::quat;
 use crate::math::vec3::Vec3;
 use crate::step::forces::actuators::next;
+use crate::step::forces::delays::{self, Moment};
 use crate::step::tree::generalized::{accelerations, free_bodies, halves, velocities};
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage};
@@ -56,6 +57,9 @@ const READS: &[A] = &[
     A::JointQdd,
     A::Rotation,
     A::Origin,
+    A::Ctrl,
+    A::ControlHistory,
+    A::DelayedControl,
     A::Act,
     A::ActDot,
     A::RkWarmStart,
@@ -73,6 +77,9 @@ const READS_LATER: &[A] = &[
     A::RkVelocity,
     A::RkVelocitySum,
     A::RkAccelerationSum,
+    A::Ctrl,
+    A::ControlHistory,
+    A::DelayedControl,
     A::Act,
     A::ActDot,
     A::RkAct,
@@ -95,6 +102,8 @@ impl<const K: usize> Stage for RungeKutta<K> {
         A::Act,
         A::RkAct,
         A::RkActRateSum,
+        A::ControlHistory,
+        A::DelayedControl,
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
@@ -147,6 +156,13 @@ impl<const K: usize> Stage for RungeKutta<K> {
             }
         }
         go_on_acting::<C, K>(cx, m, b);
+        // controls of the next evaluation; those of this step count from the next one on
+        match K {
+            0 => delays::read(cx, m, b, Moment::Middle),
+            2 => delays::read(cx, m, b, Moment::End),
+            3 => delays::append(cx, m, b),
+            _ => {}
+        }
         // h aₖ, and h to the next state
         let reach = C::F::c(m.dt.to_f64() * REACHES.get(K).copied().unwrap_or(1.0));
         // positions first: free velocities below need the new rotations

@@ -35,7 +35,7 @@ use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::forces::{actuators, curves, damping, ellipsoid_fluid, fluid};
+use crate::step::forces::{actuators, curves, damping, delays, ellipsoid_fluid, fluid};
 use crate::step::tree::free_joints;
 use crate::step::tree::generalized::keep_accelerations;
 use crate::step::tree::kinematics::read_quat;
@@ -48,6 +48,8 @@ impl Stage for Integrate {
     const READS: &'static [A] = &[
         A::Params,
         A::Ctrl,
+        A::ControlHistory,
+        A::DelayedControl,
         A::Act,
         A::ActDot,
         A::ActuatorMoment,
@@ -76,6 +78,7 @@ impl Stage for Integrate {
         A::JointQd,
         A::JointQdd,
         A::Act,
+        A::ControlHistory,
         A::MassMatrix,
     ];
 
@@ -122,6 +125,7 @@ pub(super) fn advance<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
         let act = actuators::next(activation, act, b.work.act_dot[activation.place]);
         cx.set(&mut b.act[activation.place], act);
     }
+    delays::append(cx, m, b);
 }
 
 /// The activations of actuators.

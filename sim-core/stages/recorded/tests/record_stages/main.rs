@@ -266,8 +266,17 @@ fn a_control_frame_is_recorded_as_a_loop_over_substeps() {
             CommandHistory,
             CommandNoise,
             Ctrl,
+            ControlHistory,
         ];
-        let writes = [JointQ, JointQRest, JointQd, JointQdd, Unconverged, LeftOut];
+        let writes = [
+            JointQ,
+            JointQRest,
+            JointQd,
+            JointQdd,
+            Unconverged,
+            LeftOut,
+            ControlHistory,
+        ];
         let start = Instant::now();
         let recording = recorded(m, &reads, &writes, |cx, b| {
             times!(cx, SUBSTEPS, {

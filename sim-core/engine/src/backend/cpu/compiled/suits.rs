@@ -47,9 +47,9 @@ const BEND_PARTS: usize = 8;
 /// The same of a geom that counts as an ellipsoid in a medium [–].
 const FLUID_PARTS: usize = 8;
 
-/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, geoms in a medium, and commands that wait in each dof.
+/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, geoms in a medium, and commands that wait.
 fn parts(m: &Constants<f64>) -> usize {
-    let commands = m.delay.frames * m.dofs.len();
+    let commands = m.delay.frames * m.dofs.len() + m.actuators.kept_controls();
     let spans = m.tendons.iter().flat_map(|tendon| &tendon.spans);
     let spans = spans.map(|span| 1 + BEND_PARTS * usize::from(span.wrap.is_some()));
     let tendons: usize = spans.sum();
