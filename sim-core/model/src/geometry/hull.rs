@@ -1,5 +1,7 @@
 //! Convex polyhedra for contacts: few vertices, and faces that are polygons rather than triangles.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::polytope::triangles_around_stretched;
@@ -27,10 +29,22 @@ pub struct Hull {
     pub edges: Vec<Edge>,
     /// Polygons around it as MuJoCo made them, which rest on planes; `faces` do where there are none.
     pub polygons: Vec<Polygon>,
+    /// MuJoCo's hull, where this one has fewer vertices.
+    #[serde(skip)]
+    pub whole: Option<Arc<WholeHull>>,
     /// Largest height above the faces of a point that was left out [m].
     pub error: f64,
     /// Whether it is a plate that stands for points in a plane.
     pub flat: bool,
+}
+
+/// A hull as MuJoCo made it, with more vertices than tables are to have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WholeHull {
+    /// Corners in the order in which equally deep ones count. `(vertices, 3)` [m]
+    pub vertices: Vec<[f64; 3]>,
+    /// Polygons around it.
+    pub polygons: Vec<Polygon>,
 }
 
 /// A side of a hull.
@@ -114,21 +128,36 @@ impl Hull {
         height
     }
 
-    /// Centre and radius of a ball around it [m].
+    /// Its vertices, or those of the whole hull.
+    fn outermost(&self) -> &[[f64; 3]] {
+        let whole = self.whole.as_ref().map(|whole| &whole.vertices);
+        whole.unwrap_or(&self.vertices)
+    }
+
+    /// Its sides by their corners and outward normals: those that MuJoCo made, or its own faces where there are none.
+    pub fn sides(&self) -> impl Iterator<Item = (&[u32], [f64; 3])> {
+        let faces = self.faces.iter().filter(|_| self.polygons.is_empty());
+        let faces = faces.map(|face| (&face.corners[..], face.normal));
+        let polygons = self.polygons.iter();
+        let polygons = polygons.map(|side| (&side.corners[..], side.normal));
+        polygons.chain(faces)
+    }
+
+    /// Centre and radius of a ball around it, with the whole hull [m].
     pub fn bounding_sphere(&self) -> ([f64; 3], f64) {
-        let [low, high] = extent(&self.vertices);
+        let [low, high] = self.extent();
         let centre = scale(add(low, high), 0.5);
         let radius = self
-            .vertices
+            .outermost()
             .iter()
             .map(|&vertex| norm(sub(vertex, centre)))
             .fold(0.0, f64::max);
         (centre, radius)
     }
 
-    /// Lowest and highest coordinates [m].
+    /// Lowest and highest coordinates, with the whole hull [m].
     pub fn extent(&self) -> [[f64; 3]; 2] {
-        extent(&self.vertices)
+        extent(self.outermost())
     }
 
     /// Its volume [m³].

@@ -23,7 +23,7 @@ mod visual;
 
 pub use cache::keep_meshes;
 pub use height_field::{HeightField, SAMPLES_MAX};
-pub use hull::{Edge, Face, Hull, Polygon};
+pub use hull::{Edge, Face, Hull, Polygon, WholeHull};
 pub use load::{FILE_MAX, TRIANGLES_MAX};
 pub use mass::{DENSITY, mass_properties};
 pub use mesh::{HULL_NOTE, Mesh, MeshOptions};

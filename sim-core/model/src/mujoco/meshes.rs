@@ -8,7 +8,7 @@ use super::names::names;
 use super::options::MujocoOptions;
 use crate::description::Shape;
 use crate::error::ModelError;
-use crate::geometry::{Hull, Mesh, MeshOptions, Polygon, TriMesh};
+use crate::geometry::{Hull, Mesh, MeshOptions, Polygon, TriMesh, WholeHull};
 
 /// Of a mesh with fewer vertices MuJoCo looks at all of them, of others at those of its hull.
 const HULL_VERTICES_MIN: usize = 10;
@@ -68,10 +68,13 @@ fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelEr
     of_meshes.collect::<Option<_>>().ok_or_else(beyond)
 }
 
-/// The hull as MuJoCo has it: its vertices in the order in which equally deep ones count, and its polygons.
-///
-/// `corners` are the vertices of the mesh that MuJoCo's hull has. A hull with fewer vertices keeps its own faces.
-fn as_mujoco(hull: Hull, vertices: &[[f64; 3]], corners: &[usize], polygons: &[Polygon]) -> Hull {
+/// MuJoCo's hull of these vertices: `corners` are those that it has, in the order in which equally deep ones count. None where its
+/// polygons have others.
+fn mujocos_hull(
+    vertices: &[[f64; 3]],
+    corners: &[usize],
+    polygons: &[Polygon],
+) -> Option<WholeHull> {
     let order: Vec<usize> = match vertices.len() < HULL_VERTICES_MIN {
         true => (0..vertices.len()).collect(),
         false => corners.to_vec(),
@@ -88,13 +91,10 @@ fn as_mujoco(hull: Hull, vertices: &[[f64; 3]], corners: &[usize], polygons: &[P
             normal: polygon.normal,
         })
     });
-    match renamed.collect() {
-        Some(polygons) => {
-            let vertices = order.into_iter().map(|vertex| vertices[vertex]).collect();
-            hull.with_polygons(vertices, polygons)
-        }
-        None => hull,
-    }
+    Some(WholeHull {
+        polygons: renamed.collect::<Option<_>>()?,
+        vertices: order.into_iter().map(|vertex| vertices[vertex]).collect(),
+    })
 }
 
 impl<'a> Meshes<'a> {
@@ -186,12 +186,26 @@ impl<'a> Meshes<'a> {
                 collada_up_axis: false,
             },
         )?;
-        let is_whole = (1..=most).contains(&hull.len());
-        let whole = |computed: Hull| match is_whole && !computed.flat {
-            true => as_mujoco(computed, &points, &corners, &self.polygons[place]),
-            false => computed,
+        let of_mujoco = match hull.is_empty() {
+            true => None,
+            false => mujocos_hull(&points, &corners, &self.polygons[place]),
         };
-        mesh.hulls = mesh.hulls.into_iter().map(whole).collect();
+        if let Some(whole) = of_mujoco {
+            let has_room = hull.len() <= most;
+            let as_mujocos = |computed: Hull| match (computed.flat, has_room) {
+                (true, _) => computed,
+                (false, true) => {
+                    computed.with_polygons(whole.vertices.clone(), whole.polygons.clone())
+                }
+                // a lower limit counts in `f64`, too, and a file of an older version has no polygons
+                (false, false) => Hull {
+                    whole: (most == MujocoOptions::HULL_VERTICES && !whole.polygons.is_empty())
+                        .then(|| Arc::new(whole.clone())),
+                    ..computed
+                },
+            };
+            mesh.hulls = mesh.hulls.into_iter().map(as_mujocos).collect();
+        }
         Ok(Shape::Mesh(Arc::new(mesh)))
     }
 }

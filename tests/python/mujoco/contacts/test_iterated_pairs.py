@@ -25,7 +25,7 @@ PAIRS = [
     *("sphere ellipsoid", "sphere rock", "capsule ellipsoid", "capsule cylinder", "capsule rock", "capsule drum"),
     *("ellipsoid ellipsoid", "ellipsoid cylinder", "ellipsoid box", "ellipsoid rock", "cylinder cylinder"),
     *("cylinder box", "cylinder rock", "cylinder drum", "box rock", "box brick", "box drum", "rock rock"),
-    *("brick brick", "brick drum", "drum drum"),
+    *("brick brick", "brick drum", "drum drum", "capsule boulder", "box boulder", "boulder boulder"),
 ]
 #: Sizes [m] of the geoms that have one.
 SIZES = {
@@ -37,16 +37,22 @@ SIZES = {
 }
 
 
-def assets(rng: Generator) -> str:
-    """Meshes: a stone of any form, a cuboid, and a prism with many sides."""
+def boulder() -> Array:
+    """A stone with more corners than tables have."""
+    corners = np.random.default_rng(13).normal(size=(1500, 3))
+    return corners / np.linalg.norm(corners, axis=1)[:, None] * [0.12, 0.11, 0.1]
+
+
+def assets(rng: Generator, names: list[str]) -> str:
+    """Meshes: a stone of any form, a large one, a cuboid, and a prism with many sides."""
     rock = rng.normal(size=(30, 3))
     rock *= 0.12 / np.linalg.norm(rock, axis=1)[:, None]
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     drum = [[0.1 * np.cos(a), 0.1 * np.sin(a), z] for z in (-0.06, 0.06) for a in angles]
-    meshes = {"rock": rock, "brick": signs * [0.1, 0.08, 0.06], "drum": np.array(drum)}
+    meshes = {"rock": rock, "boulder": boulder(), "brick": signs * [0.1, 0.08, 0.06], "drum": np.array(drum)}
     texts = {name: " ".join(f"{x:.6f}" for x in vertices.ravel()) for name, vertices in meshes.items()}
-    return "".join(f'<mesh name="{name}" vertex="{text}"/>' for name, text in texts.items())
+    return "".join(f'<mesh name="{name}" vertex="{text}"/>' for name, text in texts.items() if name in names)
 
 
 def geom(name: str, margin: float) -> str:
@@ -60,7 +66,7 @@ def model_of(rng: Generator, names: str, margin: float, option: str = "", flags:
     exact = 'gravity="0 0 0" tolerance="0" iterations="200" ls_iterations="100"'
     return mujoco.MjModel.from_xml_string(
         f"""<mujoco><option {exact} {option}>{flags}</option>
-        <asset>{assets(rng)}</asset><worldbody>{geom(first, margin)}
+        <asset>{assets(rng, names.split())}</asset><worldbody>{geom(first, margin)}
         <body><freejoint/>{geom(second, margin)}</body></worldbody></mujoco>"""
     )
 
@@ -181,8 +187,9 @@ def heap(rng: Generator) -> mujoco.MjModel:
         f'<body pos="{x} {y} {0.25 + 0.1 * k}"><freejoint/>{geom(name, 0.0)}</body>'
         for k, (name, (x, y)) in enumerate(zip(HEAP, rng.uniform(-0.15, 0.15, (6, 2)), strict=True))
     )
+    stones = assets(rng, list(HEAP))
     return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option tolerance="0" iterations="100" ls_iterations="50"/><asset>{assets(rng)}</asset><worldbody>
+        f"""<mujoco><option tolerance="0" iterations="100" ls_iterations="50"/><asset>{stones}</asset><worldbody>
         <geom type="box" size=".4 .4 .05"/><geom type="box" size=".05 .4 .2" pos=".4 0 .2"/>
         <geom type="box" size=".05 .4 .2" pos="-.4 0 .2"/>{bodies}</worldbody></mujoco>"""
     )

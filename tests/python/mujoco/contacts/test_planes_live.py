@@ -152,9 +152,11 @@ MESHES = {
     "200 points": scattered(2, 200),
     "ball of 60": ball(3, 60),
     "ball of 500": ball(4, 500),
+    # more than tables have
+    "ball of 1500": ball(5, 1500),
 }
-# One with flat faces, one with many corners in a face, one without faces
-DAILY = ("cube", "prism of 16", "ball of 60")
+# One with flat faces, one with many corners in a face, two without faces
+DAILY = ("cube", "prism of 16", "ball of 60", "ball of 1500")
 
 
 def mesh_model(points: Array, margin: float, plane: str = "level") -> mujoco.MjModel:

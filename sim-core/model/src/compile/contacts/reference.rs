@@ -40,21 +40,20 @@ fn limits(scene: &Description) -> Option<Limits> {
     limits?.into_iter().reduce(both)
 }
 
-/// A hull by MuJoCo's polygons, or by its own faces where it has none.
+/// The hull that MuJoCo has, or this one where it has none.
 fn reference_hull(hull: &Hull, center: [f64; 3]) -> Option<ReferenceHull> {
-    let polygons = hull
-        .polygons
-        .iter()
-        .map(|side| (side.corners.clone(), side.normal));
-    let faces = hull
-        .faces
-        .iter()
-        .map(|side| (side.corners.clone(), side.normal));
-    let sides: Vec<_> = match hull.polygons.is_empty() {
-        true => faces.collect(),
-        false => polygons.collect(),
-    };
     // a mesh of MuJoCo has the origin of its vertices as its centre, which is inside of it
     let origin = center.map(|x| -x);
-    ReferenceHull::new(origin, hull.vertices.clone(), sides.into_iter())
+    match &hull.whole {
+        Some(whole) => {
+            let sides = whole.polygons.iter();
+            let sides = sides.map(|side| (side.corners.clone(), side.normal));
+            ReferenceHull::new(origin, whole.vertices.clone(), sides)
+        }
+        None => {
+            let sides = hull.sides();
+            let sides = sides.map(|(corners, normal)| (corners.to_vec(), normal));
+            ReferenceHull::new(origin, hull.vertices.clone(), sides)
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Where the convex hulls of a model are in its tables.
 
 pub mod reference;
+pub mod resting;
 
 use crate::lane::Fixed;
 

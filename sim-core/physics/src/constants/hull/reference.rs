@@ -1,5 +1,6 @@
 //! What the search for contacts in double precision reads beside the tables; see `step::collide::reference`.
 
+use super::resting::resting;
 use crate::constants::recast::{Recast, same};
 use std::sync::Arc;
 
@@ -56,6 +57,8 @@ pub struct ReferenceHull {
     pub normals: Vec<[f64; 3]>,
     /// The faces around each vertex, rising.
     pub around: Vec<Vec<u32>>,
+    /// Of each of these faces, the corners that rest on a plane with the vertex.
+    pub resting: Vec<Vec<Vec<u32>>>,
 }
 
 impl ReferenceHull {
@@ -67,9 +70,11 @@ impl ReferenceHull {
     ) -> Option<ReferenceHull> {
         let (faces, normals): (Vec<Vec<u32>>, Vec<[f64; 3]>) = sides.unzip();
         let mut around = vec![Vec::new(); vertices.len()];
+        let mut beside = vec![Vec::new(); vertices.len()];
         for (side, corners) in faces.iter().enumerate() {
-            for &corner in corners {
+            for (at, &corner) in corners.iter().enumerate() {
                 around.get_mut(corner as usize)?.push(side as u32);
+                beside[corner as usize].push(resting(&vertices, corners, at));
             }
         }
         let has_room = faces.iter().all(|corners| corners.len() <= CORNERS_MAX)
@@ -80,6 +85,7 @@ impl ReferenceHull {
             faces,
             normals,
             around,
+            resting: beside,
         })
     }
 

@@ -5,7 +5,7 @@ use super::convex::hull::Hull;
 use super::convex::{hulls, plane_hull};
 use super::manifold::points::Points;
 use super::primitive::{boxes, capsules, cylinders, ellipsoids, planes, spheres};
-use super::reference::{iterates, reference_contacts};
+use super::reference::{is_reference, reference_contacts};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::clip::Cut;
@@ -200,9 +200,10 @@ macro_rules! pairs {
                 #[inline(always)]
                 fn contacts<C: Cx>(cx: &mut C, pair: &ShapePair<'_, C>, out: &mut Points<C>) {
                     // in double precision, models from MuJoCo have its points
-                    let is_reference = <<C::F as Num>::Real as Real>::DOUBLE && pair.reference.is_used;
-                    if is_reference
-                        && iterates(Self::KINDS)
+                    let is_double = <<C::F as Num>::Real as Real>::DOUBLE;
+                    if is_double
+                        && pair.reference.is_used
+                        && is_reference(Self::KINDS)
                         && reference_contacts(cx, Self::KINDS, pair, out)
                     {
                         return;

@@ -11,6 +11,7 @@
 //! | the depth of those that do | `epa`, `first_polytope`, `polytope` |
 //! | several points of shapes that lie on each other | `features`, `sides`, `clip` |
 //! | all of it, with margins | `search` |
+//! | a mesh on a plane | `plane` |
 
 mod clip;
 mod epa;
@@ -18,6 +19,7 @@ mod features;
 mod first_polytope;
 mod gjk;
 mod nearest;
+mod plane;
 mod polytope;
 mod search;
 mod sides;
@@ -35,9 +37,10 @@ use clip::Contacts;
 use search::Nearest;
 use solid::{Form, Solid};
 
-/// Do two kinds of shapes touch where iterations end? The others have closed forms, or a height field.
-pub const fn iterates((first, second): (Kind, Kind)) -> bool {
+/// Do two kinds of shapes touch where iterations end, or at vertices of a mesh? The others have closed forms, or a height field.
+pub const fn is_reference((first, second): (Kind, Kind)) -> bool {
     match (first, second) {
+        (Kind::Plane, Kind::Hull) => true,
         (Kind::Plane | Kind::Field, _) | (Kind::Box, Kind::Box) => false,
         (Kind::Sphere, second) => matches!(second, Kind::Ellipsoid | Kind::Hull),
         (Kind::Capsule, second) => !matches!(second, Kind::Capsule | Kind::Box),
@@ -63,20 +66,32 @@ pub fn reference_contacts<C: Cx>(
         return false;
     };
     let margin = cx.reference(pair.reach);
+    if let (Kind::Plane, Form::Mesh(hull)) = (first, b.form) {
+        let points = plane::plane_contacts(a.axes[2], &b, hull, margin);
+        add_all(cx, points, 1.0, out);
+        return true;
+    }
     // MuJoCo's order of kinds has ellipsoids and cylinders before boxes
     let is_swapped = rank(first) > rank(second);
     let (solids, side) = match is_swapped {
         true => ([b, a], -1.0),
         false => ([a, b], 1.0),
     };
+    let points = contacts(solids, margin, &search.limits);
+    add_all(cx, points, side, out);
+    true
+}
+
+/// Adds contacts, with normals from the first shape of the pair where `side` is 1, from the second where it is -1.
+#[inline(always)]
+fn add_all<C: Cx>(cx: &mut C, contacts: Contacts, side: f64, out: &mut Points<C>) {
     // this world is active, or the block would have been skipped
     let always = C::F::c(0.0).lt(C::F::c(1.0));
-    for contact in contacts(solids, margin, &search.limits) {
+    for contact in contacts {
         let point = Vec3(contact.point.map(C::F::c));
         let normal = Vec3(contact.normal.map(|x| C::F::c(x * side)));
         out.add(cx, always, point, C::F::c(contact.distance), normal);
     }
-    true
 }
 
 /// Adds the contact of a shape of this kind, the first of the pair, and a prism of a height field, whose axes are those of the
