@@ -356,6 +356,8 @@ impl Case {
             block.joint_f[j] = number(30.0);
             block.joint_target_qd[j] = number(1.0);
         }
+        let rests = m.springs.starting_rests();
+        block.plastic_rest.copy_from_slice(&rests);
         for x in block.ctrl.iter_mut().chain(&mut block.control_history) {
             *x = number(2.0);
         }

@@ -313,6 +313,7 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
             ((5 + 3 * m.delay.frames) * model.dofs()
                 + 2 * model.coords()
                 + m.actuators.kept_controls()
+                + m.springs.plastic_rests()
                 + m.varying.len()) as u64
                 * real
                 + 45,

@@ -35,7 +35,6 @@ MODEL = {
     "of pictures of height fields": "hfield_pathadr",
     "refused with delays of sensors": "sensor_history*",
     "refused with the flag for sleep": "tree_sleep_policy dof_length",
-    "refused with plastic springs": "jnt_plasticadr tendon_plasticadr key_plastic",
     "read in parts": "opt stat",
 }
 #: Parts of `MjOption` that are not read.

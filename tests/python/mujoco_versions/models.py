@@ -205,6 +205,33 @@ MODELS = {
     "heap-override": Model(HEAP.format(cone="elliptic").replace("<worldbody>", _OVERRIDE, 1), 1e-6, 40),
 }
 
+_YIELDING = """<mujoco model="yielding">
+  <option timestep=".002" integrator="{integrator}"/>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <site name="top" pos=".1 .1 1.6"/>
+    <body pos="0 0 1">
+      <joint name="hinge" axis="0 1 0" stiffness="9" springref="20" springyield="5" damping=".02"/>
+      <geom size=".1" pos=".3 0 0"/><site name="arm" pos=".3 0 .1"/>
+      <body pos=".5 0 0"><joint name="slide" type="slide" axis="1 0 0" stiffness="30 5 200" springyield=".02"/>
+        <geom size=".08"/></body>
+    </body>{more}
+  </worldbody>
+  <tendon>
+    <fixed name="sum" stiffness="20" springlength="-.05 .05" springyield=".03">
+      <joint joint="hinge" coef="1"/><joint joint="slide" coef="-2"/></fixed>
+    <spatial name="rope" stiffness="20" springlength="0 .5" springyield=".02">
+      <site site="top"/><site site="arm"/></spatial>
+  </tendon>
+  <keyframe><key name="fast" qvel="{speeds}"/></keyframe>
+</mujoco>"""
+_BALL = '<body pos="0 1 1"><joint type="ball" stiffness="3" springyield="4"/><geom size=".1" pos=".3 .05 0"/></body>'
+#: Models that MuJoCo 4.0 was the first to compile.
+NEWER = {
+    "yielding": Model(_YIELDING.format(integrator="implicitfast", more=_BALL, speeds="-3 1 2 1 1"), 1e-8, 100),
+    "yielding-rk4": Model(_YIELDING.format(integrator="RK4", more="", speeds="-3 1"), 1e-8, 100),
+}
+
 _SPRING = '<worldbody><body><joint name="j" axis="0 1 0" {}/><geom size=".1" pos=".3 0 0"/></body></worldbody>'
 _FALL = (
     '<worldbody><geom type="plane" size="3 3 .1"/>'
@@ -256,14 +283,10 @@ REFUSED = {
         "sensor `t`: no support for sites of meshes",
         is_sensor=True,
     ),
-    "plastic joint": Refused(
-        (4, 0), _SPRING.format('stiffness="20" springyield="2"'), "joint `j`: no support for plastic springs"
-    ),
-    "plastic tendon": Refused(
+    "plastic keyframe": Refused(
         (4, 0),
-        _SPRING.format("")
-        + '<tendon><fixed name="t" stiffness="20" springyield="2"><joint joint="j" coef="1"/></fixed></tendon>',
-        "tendon `t`: no support for plastic springs",
+        _SPRING.format('stiffness="20" springyield="2"') + '<keyframe><key name="bent" plastic="1"/></keyframe>',
+        "key `bent`: no support for rests of plastic springs",
     ),
     "flag speculative": Refused(
         (4, 0), '<option><flag speculative="enable"/></option>' + _FALL.format(""), "no support for mjENBL_SPECULATIVE"

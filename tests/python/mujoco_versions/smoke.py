@@ -18,7 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from inventory import undecided
-from models import MODELS, REFUSED, Model
+from models import MODELS, NEWER, REFUSED, Model
 from numpy.typing import NDArray
 
 import tightloop as tl
@@ -255,7 +255,7 @@ def main(home: Path, others: list[str]) -> int:
     folder = home / mujoco.__version__
     folder.mkdir(parents=True, exist_ok=True)
     tasks: dict[str, Any] = {"inventory": inventory, "refusals": refusals}
-    for name, case in MODELS.items():
+    for name, case in (MODELS | (NEWER if VERSION >= (4, 0) else {})).items():
         tasks[name] = lambda name=name, case=case: steps(name, case, folder)
     for name in ("cart", "machine", "heap"):
         tasks[f"Batch of {name}"] = lambda name=name: batch(MODELS[name])

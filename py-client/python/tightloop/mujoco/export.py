@@ -68,8 +68,9 @@ _ARRAYS = """
 """.split()
 # Arrays of newer versions; where they are missing, no model has what they describe.
 _NEWER_ARRAYS = """
-    jnt_stiffnesspoly jnt_springyield dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature
-    tendon_dampingpoly tendon_stiffnesspoly tendon_springyield pair_adhesion tendon_actfrclimited tendon_actfrcrange
+    jnt_stiffnesspoly jnt_springyield jnt_plasticadr dof_dampingpoly geom_adhesion geom_surfacevel tendon_armature
+    tendon_dampingpoly tendon_stiffnesspoly tendon_springyield tendon_plasticadr key_plastic
+    pair_adhesion tendon_actfrclimited tendon_actfrcrange
     actuator_delay actuator_history actuator_armature actuator_damping
     actuator_dampingpoly jnt_actuatorid tendon_actuatorid actuator_ctrlnum actuator_ctrlspec
     actuator_outnum site_dataid mesh_pos mesh_quat

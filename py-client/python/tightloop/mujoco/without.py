@@ -22,7 +22,10 @@ _POWER_MAX, _POWER = 16.0, 4
 #: Integrators that every device has. A GPU has no ``mjINT_IMPLICIT``, so that a model may be made without it.
 _INTEGRATORS = ("mjINT_EULER", "mjINT_IMPLICITFAST", "mjINT_RK4")
 #: Arrays with a row for each element of a kind begin so.
-_PREFIXES = {"equality": "eq_", "pair": "pair_", "tendon": "tendon_", "actuator": "actuator_", "geom": "geom_"}
+_PREFIXES = {
+    **{"equality": "eq_", "pair": "pair_", "tendon": "tendon_", "actuator": "actuator_", "geom": "geom_"},
+    "key": "key_",
+}
 
 
 def checked(names: Iterable[str]) -> tuple[str, ...]:
@@ -150,7 +153,6 @@ def _geom(found: Arrays, place: int) -> list[str]:
 
 
 def _joint(found: Arrays, place: int) -> list[str]:
-    _zero(found, place, "jnt_springyield")
     single = texts(found["jnt_type.names"])[found["jnt_type"][place]] in ("mjJNT_HINGE", "mjJNT_SLIDE")
     if not single:
         _zero(found, place, "jnt_actfrclimited")
@@ -161,12 +163,17 @@ def _joint(found: Arrays, place: int) -> list[str]:
         _bound_power(found, slice(place, place + 1), "jnt_solimp"),
         _bound_power(found, slice(int(first), int(end)), "dof_solimp"),
     ]
-    return ["has no plastic spring" + ("" if single else ", and no bound of its actuators' forces") + max(powers)]
+    return [("keeps what is supported" if single else "has no bound of its actuators' forces") + max(powers)]
 
 
 def _pair(found: Arrays, place: int) -> list[str]:
     _drop(found, "pair", np.arange(len(found["pair_geom1"])) == place)
     return ["is left out: its geoms touch by their own parameters, if they may"]
+
+
+def _key(found: Arrays, place: int) -> list[str]:
+    _drop(found, "key", np.arange(len(found["key_time"])) == place)
+    return ["is left out"]
 
 
 def _equality(found: Arrays, place: int) -> list[str]:
@@ -175,9 +182,12 @@ def _equality(found: Arrays, place: int) -> list[str]:
 
 
 def _tendon(found: Arrays, place: int) -> list[str]:
-    polynomials = ("tendon_dampingpoly", "tendon_stiffnesspoly", "tendon_springyield")
+    polynomials = ("tendon_dampingpoly", "tendon_stiffnesspoly")
     own = ("tendon_damping", "tendon_stiffness", "tendon_frictionloss", "tendon_limited", "tendon_armature")
     _zero(found, place, *own, *polynomials, "tendon_num", "tendon_actfrclimited")
+    if "tendon_plasticadr" in found:
+        found["tendon_plasticadr"] = found["tendon_plasticadr"].copy()
+        found["tendon_plasticadr"][place] = -1
     _bound_power(found, slice(place, place + 1), "tendon_solimp_lim", "tendon_solimp_fri")
     kinds = texts(found["eq_type.names"])
     ties = np.array([kinds[kind] == "mjEQ_TENDON" for kind in found["eq_type"]], bool)
@@ -229,4 +239,5 @@ _LEFT_OUT: dict[str, Callable[[Arrays, int], list[str]]] = {
     "equality": _equality,
     "tendon": _tendon,
     "actuator": _actuator,
+    "key": _key,
 }

@@ -8,7 +8,7 @@ use sim_physics::step::StageId;
 
 /// The arrays of a record in their order, which is that of a snapshot's file: arrays with an entry for each dof first, the
 /// parameters last.
-pub(in crate::backend) const RECORD: [Array; 15] = [
+pub(in crate::backend) const RECORD: [Array; 16] = [
     Array::JointQd,
     Array::JointQdd,
     Array::JointF,
@@ -18,6 +18,7 @@ pub(in crate::backend) const RECORD: [Array; 15] = [
     Array::JointQRest,
     Array::Act,
     Array::ControlHistory,
+    Array::PlasticRest,
     Array::CommandHistory,
     Array::Ctrl,
     Array::MocapPos,
@@ -92,8 +93,10 @@ pub(in crate::backend) fn start<R: Real>(model: &Model) -> Vec<R> {
     let shape = Shape::from_constants(model.constants());
     let start = model.start();
     let mut reset = vec![R::default(); shape.total()];
+    let plastic_rests = model.constants().springs.starting_rests();
     for (array, values) in [
         (Array::JointQ, &start.joint_q),
+        (Array::PlasticRest, &plastic_rests),
         (Array::JointTargetQ, &start.joint_target_q),
         (Array::JointTargetQd, &start.joint_target_qd),
         (Array::MocapPos, &start.mocap_pos),

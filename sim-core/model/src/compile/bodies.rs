@@ -370,8 +370,10 @@ impl BodyBuilder {
             self.equality_names.push(format!("{}/{name}", robot.name));
             self.start.eq_active.push(f64::from(u8::from(*is_active)));
         }
-        let springs = parts.tendons.iter().map(|tendon| lengths.spring(tendon));
-        self.springs.tendons.extend(springs);
+        for tendon in &parts.tendons {
+            let place = self.springs.plastic_rests();
+            self.springs.tendons.push(lengths.spring(tendon, place));
+        }
         actuators::add_tendon_bounds(&mut self.actuators, parts);
         for actuator in &parts.actuators {
             self.actuator_names

@@ -3,6 +3,7 @@
 use super::bodies::{BodyBuilder, columns};
 use super::carrier::Carrier;
 use super::masses::massless;
+use super::tendons::plasticity;
 use crate::description::{
     Compensator, Description, EllipsoidInFluid, Joint, JointExtras, Precompiled, Robot,
 };
@@ -28,6 +29,7 @@ impl BodyBuilder {
         {
             dof.damping_curve = curve;
         }
+        let plasticity = plasticity(extras.spring_yield, self.springs.plastic_rests());
         let has_spring = extras.stiffness != 0.0 || extras.stiffness_curve != [0.0; 2];
         if has_spring && has_pose {
             self.springs.poses.push(PoseSpring {
@@ -36,6 +38,7 @@ impl BodyBuilder {
                 position: extras.spring_pose.pos,
                 quat: extras.spring_pose.quat,
                 curve: extras.stiffness_curve,
+                plasticity,
             });
         } else if has_spring {
             self.springs.joints.push(Spring {
@@ -43,6 +46,7 @@ impl BodyBuilder {
                 stiffness: extras.stiffness,
                 rest: extras.spring_ref,
                 curve: extras.stiffness_curve,
+                plasticity,
             });
         }
         if joint.kind == JointKind::Free {

@@ -6,7 +6,7 @@ use super::output_frames::mounted_on;
 use crate::description::{self, OnLink};
 use sim_physics::constants::lengths::{Length, Term};
 use sim_physics::constants::site::Mount;
-use sim_physics::constants::springs::Tendon;
+use sim_physics::constants::springs::{Plasticity, Tendon};
 use sim_physics::constants::tendons::{Inner, Span, SpatialTendon, Wrap};
 use sim_physics::constants::{Body, Motion};
 
@@ -42,8 +42,8 @@ impl Lengths<'_> {
         all.collect()
     }
 
-    /// The spring and damper of a tendon.
-    pub fn spring(&self, tendon: &description::Tendon) -> Tendon<f64> {
+    /// The spring and damper of a tendon. Its rests begin at `place` if they are state.
+    pub fn spring(&self, tendon: &description::Tendon, place: usize) -> Tendon<f64> {
         Tendon {
             length: self.length(&tendon.length),
             stiffness: tendon.stiffness,
@@ -52,6 +52,7 @@ impl Lengths<'_> {
             armature: tendon.armature,
             stiffness_curve: tendon.stiffness_curve,
             damping_curve: tendon.damping_curve,
+            plasticity: plasticity(tendon.spring_yield, place),
         }
     }
 
@@ -61,6 +62,11 @@ impl Lengths<'_> {
         dofs.extend(length.tendon.iter().flat_map(|&k| &self.tendons[k].dofs));
         dofs
     }
+}
+
+/// How rests follow, from `place` on in the state; none where a spring does not yield.
+pub(super) fn plasticity(spring_yield: Option<f64>, place: usize) -> Option<Plasticity<f64>> {
+    spring_yield.map(|bound| Plasticity { place, bound })
 }
 
 /// Adds the spatial tendons of a robot to those before it.

@@ -87,4 +87,6 @@ pub struct Tendon {
     pub stiffness_curve: [f64; 2],
     /// By which its damping grows with the speed and its square [N·s²/m², N·s³/m³ or N·m·s²/rad², N·m·s³/rad³].
     pub damping_curve: [f64; 2],
+    /// Stretch beyond which its rests follow, if its spring yields [m or rad].
+    pub spring_yield: Option<f64>,
 }

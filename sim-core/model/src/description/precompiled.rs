@@ -97,6 +97,8 @@ pub struct JointExtras {
     pub damping_curves: [[f64; 2]; 6],
     /// Pose without force of the spring of a ball or a free joint.
     pub spring_pose: Pose,
+    /// Stretch beyond which the rest of its spring follows, if it yields [rad or m].
+    pub spring_yield: Option<f64>,
     /// What compensates gravity along it.
     pub compensator: Compensator,
     /// Softness of its limits.

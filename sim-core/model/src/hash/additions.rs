@@ -12,7 +12,7 @@ use sim_physics::constants::options::{Integrator, Search};
 use sim_physics::constants::outputs::{OutputBody, OutputFrames, OutputTendon};
 use sim_physics::constants::passive::{Compensation, Drag, FluidGeom, GravityCompensation};
 use sim_physics::constants::sensors::Sensors;
-use sim_physics::constants::springs::{PoseSpring, Spring, Springs, Tendon};
+use sim_physics::constants::springs::{Plasticity, PoseSpring, Spring, Springs, Tendon};
 use sim_physics::constants::tendons::{Inner, Span, SpatialTendon, Wrap};
 use sim_physics::constants::ties::{Frames, Lengths, Measure, Tie, TieLaw};
 
@@ -188,10 +188,14 @@ view! {
         Later { "fluid_geoms": fluid_geoms };
     Spring<f64> as "Spring":
         Always { "dof": dof, "stiffness": stiffness, "rest": rest }
-        Later { "curve": curve };
+        Later { "curve": curve }
+        Later { "plasticity": plasticity };
     PoseSpring<f64> as "PoseSpring":
         Always { "body": body, "stiffness": stiffness, "position": position, "quat": quat }
-        Later { "curve": curve };
+        Later { "curve": curve }
+        Later { "plasticity": plasticity };
+    Plasticity<f64> as "Plasticity":
+        Always { "place": place, "bound": bound };
     Drag<f64> as "Drag":
         Always {
             "body": body,
@@ -225,7 +229,8 @@ view! {
         Always { "terms": length, "stiffness": stiffness, "rest": rest, "damping": damping }
         Later { "armature": armature }
         Later { "stiffness_curve": stiffness_curve }
-        Later { "damping_curve": damping_curve };
+        Later { "damping_curve": damping_curve }
+        Later { "plasticity": plasticity };
     Actuator<f64> as "Actuator":
         Always {
             "terms": terms,

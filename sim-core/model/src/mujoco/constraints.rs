@@ -4,6 +4,7 @@ use super::format::ModelFile;
 use super::frame;
 use super::names::names;
 use super::options::has_flag;
+use super::plasticity;
 use super::reflected::{self, Driven};
 use super::tendons::{Tendons, moving};
 use super::tree::softness;
@@ -340,6 +341,7 @@ fn add_springs(
         false => vec![0.0; count],
     };
     let rests = file.vectors::<2>("tendon_lengthspring", count)?;
+    let yields = plasticity::yields(file, "tendon", count)?;
     for (k, share) in reflected::shares(file, Driven::Tendon, count)?
         .iter()
         .enumerate()
@@ -361,6 +363,9 @@ fn add_springs(
             armature: armature[k],
             stiffness_curve: stiffness_curves[k],
             damping_curve: damping_curves[k],
+            // what has no spring keeps no rest
+            spring_yield: yields[k]
+                .filter(|_| stiffness[k] != 0.0 || stiffness_curves[k] != [0.0; 2]),
         });
     }
     Ok(())

@@ -98,6 +98,12 @@ impl ModelFile {
         shape.and_then(|shape| shape.first().copied()).unwrap_or(0)
     }
 
+    /// How many entries a row of an array has.
+    pub fn columns(&self, name: &str) -> usize {
+        let shape = self.arrays.get(name).map(|(shape, _)| shape);
+        shape.and_then(|shape| shape.get(1).copied()).unwrap_or(0)
+    }
+
     fn entries(&self, name: &str, count: usize) -> Result<&Entries, ModelError> {
         let Some((shape, entries)) = self.arrays.get(name) else {
             return Err(self.fault(format!("lacks the array `{name}`; save the scene again")));

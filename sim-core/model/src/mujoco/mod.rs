@@ -18,6 +18,7 @@ mod names;
 mod options;
 mod pairs;
 mod passive;
+mod plasticity;
 mod rays;
 mod reflected;
 mod refusals;

@@ -7,16 +7,10 @@ use super::format::ModelFile;
 use super::names::names;
 use super::options::{OVERRIDE, contact_override, has_flag};
 use super::pairs;
+use super::plasticity;
 use super::reflected::{self, Driven};
 use crate::error::ModelError;
 use crate::softness::POWER_MAX;
-
-/// Arrays in which any entry other than 0 stands for a feature that is not supported: kind of element, array, feature. Older
-/// versions of MuJoCo do not have them.
-const MUST_BE_ZERO: &[(&str, &str, &str)] = &[
-    ("joint", "jnt_springyield", "plastic springs"),
-    ("tendon", "tendon_springyield", "plastic springs"),
-];
 
 /// Flags of `<option>` that are supported. All others are refused, also those that a newer MuJoCo brings.
 const FLAGS: &[&str] = &[
@@ -68,12 +62,6 @@ pub(super) fn listed(reasons: &[String]) -> String {
 /// A file that lacks arrays.
 pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     let mut refused = Vec::new();
-    for (kind, array, feature) in MUST_BE_ZERO {
-        if let Some(row) = file.first_set(array) {
-            let names = names(file, kind, file.rows(array))?;
-            refused.push(no(kind, &names[row], feature));
-        }
-    }
     options(file, &mut refused)?;
     joints(file, &mut refused)?;
     geoms(file, &mut refused)?;
@@ -84,6 +72,7 @@ pub(super) fn refusals(file: &ModelFile) -> Result<Vec<String>, ModelError> {
     adhesions(file, &mut refused)?;
     sticky(file, "geom", &mut refused)?;
     sticky(file, "pair", &mut refused)?;
+    plasticity::refuse(file, &mut refused)?;
     Ok(refused)
 }
 

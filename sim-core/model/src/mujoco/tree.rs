@@ -7,7 +7,7 @@ use super::frames;
 use super::names::names;
 use super::options::{MujocoOptions, contact_override, has_flag, integrator};
 use super::reflected::{self, Driven, Share};
-use super::{passive, tendons};
+use super::{passive, plasticity, tendons};
 use crate::description::{
     Compensator, Inertial, Joint, JointDof, JointExtras, JointKind, Link, Precompiled, Robot,
     SensorParts,
@@ -193,6 +193,7 @@ struct JointArrays {
     frictions: Vec<Softness>,
     qpos0: Vec<f64>,
     qpos_spring: Vec<f64>,
+    yields: Vec<Option<f64>>,
     compensators: Vec<Compensator>,
 }
 
@@ -248,6 +249,7 @@ impl JointArrays {
             frictions: softness(file, "dof", dofs)?,
             qpos0: file.reals("qpos0", coords)?,
             qpos_spring: file.reals("qpos_spring", coords)?,
+            yields: plasticity::yields(file, "jnt", joints)?,
             compensators: passive::compensators(file, joints)?,
         })
     }
@@ -379,6 +381,7 @@ impl JointArrays {
                 0.0
             },
             spring_pose: spring_pose(kind, &self.qpos_spring[coord..coord + coords]),
+            spring_yield: self.yields[k],
             compensator: self.compensators[k],
             limit: self.limits[k],
             margin: self.margins[k],

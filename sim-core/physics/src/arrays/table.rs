@@ -66,6 +66,8 @@ arrays! { m;
             => "act" State [Activations], "Activations of the actuators that have one, in their order, as MuJoCo's `act`.";
         // controls of the last steps of actuators with a delay, see `ControlDelay::first`
         control_history: ControlHistory [m.actuators.kept_controls()] Motion "–";
+        // rests of springs that yield, see `Plasticity::place`
+        plastic_rest: PlasticRest [m.springs.plastic_rests()] Motion "rad, m or –";
         // substeps since the start of the control frame
         substep: Substep [1] Counter "–";
         // 1 where the solver used up its iterations since this was cleared
@@ -179,6 +181,9 @@ arrays! { m;
         rk_velocity_sum: RkVelocitySum [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s or m/s";
         rk_acceleration_sum: RkAccelerationSum [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
+        // lengths and moments of spatial tendons where it began, for springs that yield
+        rk_length: RkLength [Scalar; if m.integrator == Integrator::RungeKutta && m.springs.yields_along_tendons() { m.tendons.len() } else { 0 }] Stage "m";
+        rk_moment: RkMoment [Scalar; if m.integrator == Integrator::RungeKutta && m.springs.yields_along_tendons() { m.tendons.iter().map(|tendon| tendon.dofs.len()).sum::<usize>() } else { 0 }] Stage "m/rad or –";
         rk_warm_start: RkWarmStart [Scalar; if m.integrator == Integrator::RungeKutta { m.dofs.len() } else { 0 }] Stage "rad/s² or m/s²";
 
         // how bias forces change with velocities, see `step::tree::bias_slope`: of dofs, then of subtrees

@@ -73,7 +73,7 @@ def test_activations_behind_an_actuator_that_is_left_out_keep_their_places():
 @pytest.mark.parametrize(
     ("without", "message"),
     [
-        (("nobody",), "the model has no geom or joint or pair or equality or tendon or actuator `nobody`"),
+        (("nobody",), "the model has no geom or joint or pair or equality or tendon or actuator or key `nobody`"),
         (("integrator",), "mjINT_EULER is supported"),
         (("tendon:rod",), "the model has no tendon `rod`"),
         ("rod", "give a tuple of names"),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tightloop._core import Frame
 from tightloop.adapters.mjlab.model_fields import ModelFields
 from tightloop.arrays.frames import FAULTED
-from tightloop.mujoco.batch.delays import refuse_delays
+from tightloop.mujoco.batch.hidden_state import refuse_hidden_state
 from tightloop.mujoco.batch.joints import JointMap
 from tightloop.scene.scene import Scene
 from tightloop.sim.command_arrays import called
@@ -58,7 +58,7 @@ class Worlds:
     """
 
     def __init__(self, model: Any, data: Any, count: int, fields: ModelFields) -> None:
-        refuse_delays(model, "mjlab on tightloop")
+        refuse_hidden_state(model, "mjlab on tightloop")
         self._model, self._data, self._count, self._fields = model, data, count, fields
         self._scene = Scene.from_mujoco(model, name=MODEL)
         self._joints = JointMap(model)

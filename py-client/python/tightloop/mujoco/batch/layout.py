@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.mujoco.batch.delays import refuse_delays
+from tightloop.mujoco.batch.hidden_state import refuse_hidden_state
 from tightloop.mujoco.batch.library import mujoco
 
 Array = NDArray[np.float64]
@@ -43,11 +43,11 @@ class StateLayout:
         size: Numbers in a row.
 
     Raises:
-        ArgumentError: An actuator has a delay.
+        ArgumentError: An actuator has a delay, or a spring is plastic.
     """
 
     def __init__(self, model: Any) -> None:
-        refuse_delays(model, "Batch")
+        refuse_hidden_state(model, "Batch")
         self._model = model
         data = mujoco.MjData(model)
         self._starts: dict[int, Array] = {}

@@ -51,7 +51,7 @@ class Batch(NamedViews):
         nstate: Numbers in a row of ``bind("state")``.
 
     Raises:
-        ArgumentError: An argument is not valid, the model enables sleep, or an actuator has a delay.
+        ArgumentError: An argument is not valid, the model enables sleep, or has delays of actuators or plastic springs.
         SceneError: The model has parts that tightloop does not support; the message names them.
     """
 

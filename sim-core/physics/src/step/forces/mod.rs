@@ -11,6 +11,7 @@
 //! | `delays` | earlier controls that actuators follow |
 //! | `motors` | DC motors: voltage, current, cogging |
 //! | `muscles` | gain, bias and activation of muscles |
+//! | `plasticity` | springs whose rest follows where they are stretched too far |
 //! | `springs` | springs and dampers of joints and tendons |
 //! | `curves` | their stiffness and damping where these are polynomials |
 //! | `fluid`, `ellipsoid_fluid` | forces of the medium: on links, on geoms that count as ellipsoids |
@@ -31,5 +32,6 @@ pub mod gravity_compensation;
 pub mod link_forces;
 mod motors;
 mod muscles;
+pub(in crate::step) mod plasticity;
 pub mod springs;
 pub mod transmission;

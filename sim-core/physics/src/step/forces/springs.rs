@@ -7,14 +7,14 @@
 //! passive = the same - damping q̇                       for output
 //! ```
 //!
-//! Stiffness and damping may be polynomials ([`super::curves`]). A free joint's spring acts at the origin of its frame ([`crate::step::tree::free_joints`]).
+//! Stiffness and damping may be polynomials ([`super::curves`]). Where a spring yields, its rest is state ([`super::plasticity`]). A free joint's spring acts at the origin of its frame ([`crate::step::tree::free_joints`]).
 
-use super::{curves, fluid, gravity_compensation};
+use super::{curves, fluid, gravity_compensation, plasticity};
 use crate::arrays::Array as A;
 use crate::constants::Constants;
 use crate::constants::Motion;
 use crate::constants::params::Param;
-use crate::constants::springs::{PoseSpring, Tendon};
+use crate::constants::springs::{PoseSpring, Spring, Tendon};
 use crate::lane::{Cx, Num, Real};
 use crate::math::quat::{self, conjugate, mul};
 use crate::math::vec3::Vec3;
@@ -36,6 +36,7 @@ impl Stage for Springs {
         A::TenLength,
         A::TenVelocity,
         A::TenMoment,
+        A::PlasticRest,
         A::SmoothForce,
     ];
     const WRITES: &'static [A] = &[A::SmoothForce];
@@ -77,6 +78,7 @@ impl Stage for Passive {
         A::TenLength,
         A::TenVelocity,
         A::TenMoment,
+        A::PlasticRest,
     ];
     const WRITES: &'static [A] = &[A::PassiveForce];
 
@@ -127,7 +129,7 @@ pub(in crate::step) fn joint_damping<F: Num>(
 fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [C::F]) {
     // -stiffness (q - rest)
     for spring in &m.springs.joints {
-        let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+        let stretch = joint_stretch(cx, m, b, spring);
         let stiffness = curves::curved(C::F::k(spring.stiffness), spring.curve, stretch);
         let force = &mut to[spring.dof];
         *force = stretch.fnma(stiffness, *force);
@@ -166,6 +168,18 @@ fn add_springs<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &BlockOf<C>, to: &mut [
     }
 }
 
+/// How far a joint with one coordinate is from its rest.
+#[inline(always)]
+pub(in crate::step) fn joint_stretch<C: Cx>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &BlockOf<C>,
+    spring: &Spring<<C::F as Num>::Real>,
+) -> C::F {
+    let [rest] = plasticity::rest(cx, b, [spring.rest], &spring.plasticity);
+    cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - rest
+}
+
 /// How far a ball or a free joint is from its rest: its position, 0 of a ball, and a rotation vector in the body's axes.
 #[inline(always)]
 pub(in crate::step) fn pose_stretch<C: Cx>(
@@ -186,7 +200,7 @@ pub(in crate::step) fn pose_stretch<C: Cx>(
     }
     // log(rest⁻¹ q)
     let here = read_quat(cx, &b.joint_q, first);
-    let rest = quat::constant(spring.quat);
+    let rest = plasticity::rest(cx, b, spring.quat, &spring.plasticity);
     [slide, quat::log(mul(conjugate(rest), here))]
 }
 
@@ -211,6 +225,6 @@ pub(in crate::step) fn stretch<C: Cx>(
 ) -> C::F {
     let length = length(cx, m, b, &tendon.length);
     // 0 between the rests
-    let [shortest, longest] = tendon.rest.map(C::F::k);
+    let [shortest, longest] = plasticity::rest(cx, b, tendon.rest, &tendon.plasticity);
     length - length.max(shortest).min(longest)
 }

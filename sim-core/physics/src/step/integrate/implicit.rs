@@ -36,6 +36,8 @@ impl Stage for Implicit {
         A::Act,
         A::ActDot,
         A::ActuatorMoment,
+        A::PlasticRest,
+        A::TenLength,
         A::TenMoment,
         A::TenVelocity,
         A::ActuatorLength,
@@ -63,6 +65,7 @@ impl Stage for Implicit {
         A::JointQdd,
         A::Act,
         A::ControlHistory,
+        A::PlasticRest,
         A::MassMatrix,
     ];
 

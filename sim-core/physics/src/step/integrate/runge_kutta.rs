@@ -18,6 +18,7 @@ use crate::math::quat;
 use crate::math::vec3::Vec3;
 use crate::step::forces::actuators::next;
 use crate::step::forces::delays::{self, Moment};
+use crate::step::forces::plasticity;
 use crate::step::tree::generalized::{accelerations, free_bodies, halves, velocities};
 use crate::step::tree::kinematics::read_quat;
 use crate::step::{BlockOf, ConstantsOf, Stage};
@@ -62,6 +63,9 @@ const READS: &[A] = &[
     A::DelayedControl,
     A::Act,
     A::ActDot,
+    A::PlasticRest,
+    A::TenLength,
+    A::TenMoment,
     A::RkWarmStart,
 ];
 /// What those after it read.
@@ -84,6 +88,9 @@ const READS_LATER: &[A] = &[
     A::ActDot,
     A::RkAct,
     A::RkActRateSum,
+    A::PlasticRest,
+    A::RkLength,
+    A::RkMoment,
     A::RkWarmStart,
 ];
 
@@ -104,6 +111,9 @@ impl<const K: usize> Stage for RungeKutta<K> {
         A::RkActRateSum,
         A::ControlHistory,
         A::DelayedControl,
+        A::PlasticRest,
+        A::RkLength,
+        A::RkMoment,
     ];
 
     fn is_needed<R: Real>(m: &Constants<R>) -> bool {
@@ -126,6 +136,10 @@ impl<const K: usize> Stage for RungeKutta<K> {
                 w.rk_q_rest[c] = cx.get(&b.joint_q_rest[c]);
             }
             w.rk_velocity.copy_from_slice(&velocity);
+            if m.springs.yields_along_tendons() {
+                w.rk_length.copy_from_slice(&w.ten_length);
+                w.rk_moment.copy_from_slice(&w.ten_moment);
+            }
         }
         // the solver of each evaluation starts from the last step's accelerations
         if K < 3 {
@@ -178,6 +192,9 @@ impl<const K: usize> Stage for RungeKutta<K> {
         // back to ours: of a free body's centre of mass, in world axes
         for (k, dof) in free_bodies(m) {
             set_free_velocity(cx, b, &m.bodies[k], &acceleration[dof..dof + 6]);
+        }
+        if K == 3 {
+            plasticity::follow_from_start(cx, m, b, &mut velocity);
         }
         (b.work.start, b.work.step) = (velocity, acceleration);
     }

@@ -35,7 +35,7 @@ use crate::math::factor::{multiply, solve};
 use crate::math::quat::{self, Quat};
 use crate::math::spatial::symmetric;
 use crate::math::vec3::{Mat3, Vec3};
-use crate::step::forces::{actuators, curves, damping, delays, ellipsoid_fluid, fluid};
+use crate::step::forces::{actuators, curves, damping, delays, ellipsoid_fluid, fluid, plasticity};
 use crate::step::tree::free_joints;
 use crate::step::tree::generalized::keep_accelerations;
 use crate::step::tree::kinematics::read_quat;
@@ -53,6 +53,8 @@ impl Stage for Integrate {
         A::Act,
         A::ActDot,
         A::ActuatorMoment,
+        A::PlasticRest,
+        A::TenLength,
         A::TenMoment,
         A::TenVelocity,
         A::ActuatorLength,
@@ -79,6 +81,7 @@ impl Stage for Integrate {
         A::JointQdd,
         A::Act,
         A::ControlHistory,
+        A::PlasticRest,
         A::MassMatrix,
     ];
 
@@ -126,6 +129,7 @@ pub(super) fn advance<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>)
         cx.set(&mut b.act[activation.place], act);
     }
     delays::append(cx, m, b);
+    plasticity::follow(cx, m, b);
 }
 
 /// The activations of actuators.

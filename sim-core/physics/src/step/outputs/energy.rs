@@ -11,7 +11,7 @@ use crate::arrays::Array as A;
 use crate::lane::{Cx, Num, Real};
 use crate::math::factor::multiply;
 use crate::step::forces::curves;
-use crate::step::forces::springs::{pose_stretch, stretch};
+use crate::step::forces::springs::{joint_stretch, pose_stretch, stretch};
 use crate::step::{BlockOf, ConstantsOf, Stage, gravity};
 
 /// Kinetic and potential energy, for output.
@@ -26,6 +26,7 @@ impl Stage for Energy {
         A::Reference,
         A::Arm,
         A::TenLength,
+        A::PlasticRest,
         A::Params,
     ];
     const WRITES: &'static [A] = &[A::KineticEnergy, A::PotentialEnergy];
@@ -57,7 +58,7 @@ impl Stage for Energy {
         }
         // ½ k (q - rest)² of springs of joints
         for spring in &m.springs.joints {
-            let stretch = cx.get(&b.joint_q[m.dofs[spring.dof].coord]) - C::F::k(spring.rest);
+            let stretch = joint_stretch(cx, m, b, spring);
             let half = curves::energy(spring.stiffness, spring.curve, stretch);
             potential = (stretch * half).fma(stretch, potential);
         }

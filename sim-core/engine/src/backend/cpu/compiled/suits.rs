@@ -47,14 +47,17 @@ const BEND_PARTS: usize = 8;
 /// The same of a geom that counts as an ellipsoid in a medium [–].
 const FLUID_PARTS: usize = 8;
 
-/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, geoms in a medium, and commands that wait.
+/// Dofs, bodies, rows of joints, actuators, pieces of spatial tendons, geoms in a medium, commands that wait, and rests of springs
+/// that yield.
 fn parts(m: &Constants<f64>) -> usize {
     let commands = m.delay.frames * m.dofs.len() + m.actuators.kept_controls();
+    let rests = m.springs.plastic_rests();
     let spans = m.tendons.iter().flat_map(|tendon| &tendon.spans);
     let spans = spans.map(|span| 1 + BEND_PARTS * usize::from(span.wrap.is_some()));
     let tendons: usize = spans.sum();
     let fluid = FLUID_PARTS * m.fluid_geoms.len();
-    m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len() + tendons + fluid + commands
+    let parts = m.dofs.len() + m.bodies.len() + m.rows() + m.actuators.all.len();
+    parts + tendons + fluid + commands + rests
 }
 
 /// Runs of stages that are compiled, as long as they can be, by their places in a substep.
