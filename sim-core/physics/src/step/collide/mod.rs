@@ -299,13 +299,13 @@ fn boxes_near<C: Cx, N: Narrow>(
 /// Rounding of the distances of a face's corners, for a shape with this radius [m].
 ///
 /// Contacts begin that much early: of a face that just touches, all corners do, not only those that were rounded down. Models
-/// from MuJoCo in double precision have none, as there.
+/// from MuJoCo in double precision begin as late instead: what just touches does not count there, since sums of round numbers
+/// are exact in its frames. In ours they may be a rounding off.
 #[inline(always)]
 pub(super) fn contact_slack<F: Num>(t: &Contacts<F::Real>, radius: F) -> F {
-    match <F::Real as Real>::DOUBLE && t.reference.is_used {
-        true => F::c(0.0),
-        false => radius * F::c(2.0 * <F::Real as Real>::EPSILON),
-    }
+    let is_late = <F::Real as Real>::DOUBLE && t.reference.is_used;
+    let side = if is_late { -1.0 } else { 1.0 };
+    radius * F::c(side * 2.0 * <F::Real as Real>::EPSILON)
 }
 
 /// Axes of a shape, by columns.
