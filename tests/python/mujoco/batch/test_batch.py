@@ -223,6 +223,36 @@ def test_reset_to_the_start_or_a_keyframe_keeps_what_was_written() -> None:
                 batch.reset(keyframe=bad)
 
 
+def test_parts_count_before_the_state_and_a_reset_forgets_what_was_written_into_it() -> None:
+    model = model_of()
+    start = np.zeros(mujoco.mj_stateSize(model, INTEGRATION))
+    mujoco.mj_getState(model, mujoco.MjData(model), start, INTEGRATION)
+    with Batch(model, N, 1, precision="f64") as batch:
+        state, qpos = batch.bind("state"), batch.bind("qpos")
+        batch.step(nstep=5)
+        saved = state[1].copy()
+        batch.step(nstep=5)
+        # a row as a whole, and an element of a part of it
+        state[1] = saved
+        qpos[1, 0] = 0.3
+        batch.forward()
+        saved[1] = 0.3
+        np.testing.assert_array_equal(state[1], saved)
+        np.testing.assert_array_equal(qpos[1], saved[1 : 1 + qpos.shape[1]])
+        # an element that a call refuses may be written again
+        state[2, 1] = np.nan
+        with pytest.raises(ValueError, match="sim 2: qpos"):
+            batch.forward()
+        state[2, 1] = 0.2
+        batch.forward()
+        assert qpos[2, 0] == state[2, 1] == 0.2
+        state[3] = saved
+        qpos[3, 1] = 0.25
+        batch.reset(np.array([3]))
+        start[2] = 0.25
+        np.testing.assert_array_equal(state[3], start)
+
+
 def test_unstable_simulations_start_again_and_count_a_warning() -> None:
     model = model_of()
     with Batch(model, N, 1, precision="f64") as batch:

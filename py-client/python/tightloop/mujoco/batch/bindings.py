@@ -21,7 +21,7 @@ _FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 @dataclass
 class _Copy:
-    """An array of its own over a part of the state, in another dtype."""
+    """An array of its own over a part of the state, in another dtype, or over all of it."""
 
     array: Array
     of: Array
@@ -38,7 +38,7 @@ class Bindings:
         num_sims: Number of simulations.
 
     Attributes:
-        rows: States, ``(num_sims, nstate)``. Callers write into them at any time.
+        rows: States, ``(num_sims, nstate)``. Callers write into views of them at any time.
         last: The rows as the last call left them.
         warnings: MuJoCo's last info and count of each warning, ``(num_sims, kinds, 2)``.
         derived: Arrays of the fields that are not part of the state, by name.
@@ -51,6 +51,9 @@ class Bindings:
         self.warnings = np.zeros((num_sims, *fields.shape("warning")), np.int32)
         self.derived: dict[str, Array] = {}
         self._copies: list[_Copy] = []
+        self._state: _Copy | None = None
+        # the rows when all that was written had been brought to them
+        self._base = self.rows.copy()
         self._arrays: dict[str, Array] = {}
 
     def get(self, name: str, dtype: DTypeLike | None) -> Array:
@@ -73,7 +76,8 @@ class Bindings:
 
     def _made(self, name: str, dtype: np.dtype[Any]) -> Array:
         if name == "state":
-            return self.rows
+            self._state = _Copy(self.last.copy(), self.rows, self.last.copy())
+            return self._state.array
         if name == "warning":
             return self.warnings
         if name not in self._layout:
@@ -91,14 +95,24 @@ class Bindings:
         return name in self._arrays
 
     def collect(self, ids: Ids) -> None:
-        """Bring elements that were written into copies to the rows."""
+        """Bring elements that were written into copies to the rows, those of a part after those of the state."""
+        self._bring_state(ids, self.rows)
         for copy in self._copies:
             _bring(copy, ids, copy.of)
+        for copy in self._all:
             copy.written[ids] = copy.array[ids]
+        self._base[ids] = self.rows[ids]
+
+    def collect_fields(self, ids: Ids) -> None:
+        """Bring what was written into fields, and forget what was written into the state as a whole."""
+        if self._state is not None:
+            self._state.array[ids] = self._state.written[ids]
+        self.collect(ids)
 
     def pending(self, ids: Ids) -> Array:
         """Return a copy of rows with all that was written, which stays pending."""
         rows = self.rows.copy()
+        self._bring_state(ids, rows)
         for copy in self._copies:
             at = copy.of.__array_interface__["data"][0] - self.rows.__array_interface__["data"][0]
             columns = slice(at // 8, at // 8 + copy.of[0].size)
@@ -108,9 +122,23 @@ class Bindings:
     def settle(self, ids: Ids) -> None:
         """End a call: what the rows hold is no longer news, and copies show it."""
         self.last[ids] = self.rows[ids]
-        for copy in self._copies:
+        for copy in self._all:
             copy.array[ids] = copy.of[ids]
             copy.written[ids] = copy.array[ids]
+        self._base[ids] = self.rows[ids]
+
+    @property
+    def _all(self) -> list[_Copy]:
+        return self._copies if self._state is None else [self._state, *self._copies]
+
+    def _bring_state(self, ids: Ids, to: Array) -> None:
+        """Bring what was written into the state since the last time, except where a field was written."""
+        if self._state is not None:
+            rows, base = self.rows[ids], self._base[ids]
+            # NaN is no other value than NaN
+            kept = (rows == base) | (np.isnan(rows) & np.isnan(base))
+            news = self._state.array[ids]
+            to[ids] = np.where((news != self._state.written[ids]) & kept, news, rows)
 
 
 def _bring(copy: _Copy, ids: Ids, to: Array) -> None:

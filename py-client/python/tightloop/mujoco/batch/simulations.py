@@ -116,13 +116,13 @@ class Batch(NamedViews):
     def bind(self, name: str, dtype: DTypeLike | None = None) -> Array:
         """Return the live array of a field of ``MjData``, ``(num_sims, ...)``; each call returns the same array.
 
-        Parts of the state may be written. A write takes effect at the simulation's next call. In its own dtype, a part
-        of the state is a view of the rows of ``"state"``. In float32 it is a copy, whose changed elements count. Every
-        other field is filled by each call, for the simulations of that call.
+        Parts of the state may be written, or all of it as ``"state"``. A write takes effect at the simulation's next
+        call, also in the other arrays. Of an element that was written in both, that of the part counts. In float32 only
+        changed elements count. Every other field is filled by each call, for the simulations of that call.
 
-        ``"state"`` is the rows themselves, ``(num_sims, nstate)``, in the order of ``mjSTATE_INTEGRATION``. Once it is
-        bound, every call starts from the rows alone, so that equal rows have equal futures bit for bit. The solver then
-        starts cold in each call.
+        ``"state"`` has rows ``(num_sims, nstate)`` in the order of ``mjSTATE_INTEGRATION``. Once it is bound, every
+        call starts from the rows alone, so that equal rows have equal futures bit for bit. The solver then starts cold
+        in each call.
 
         Args:
             name: The field, ``"state"`` or ``"warning"``.
@@ -221,7 +221,8 @@ class Batch(NamedViews):
     def reset(self, ids: ArrayLike | None = None, keyframe: int = -1) -> None:
         """Reset simulations to the model's start or a keyframe, then fill all bound fields.
 
-        Elements of the state that were written since the last call keep what was written.
+        Parts of the state that were written since the last call keep what was written. What was written into
+        ``"state"`` is lost, as in mjbatch.
 
         Args:
             ids: As in `step`.

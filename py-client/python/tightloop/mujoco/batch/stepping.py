@@ -129,7 +129,7 @@ class Stepping:
         """Reset the rows of simulations, and bring them to the simulation, for `finish`; see `Batch.reset`."""
         start = self._starts(chosen.indices, keyframe)
         bindings, ids = self._bindings, chosen.ids
-        bindings.collect(ids)
+        bindings.collect_fields(ids)
         rows, last = bindings.rows[ids], bindings.last[ids]
         # NaN is no other value than NaN
         written = (rows != last) & ~(np.isnan(rows) & np.isnan(last))
