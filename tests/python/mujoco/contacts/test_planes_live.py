@@ -173,7 +173,7 @@ def test_points_of_a_mesh_on_a_plane_are_mujocos(name, margin):
     model = mesh_model(MESHES[name], margin, "level" if margin else "tilted")
     # straight ones on an edge, 1.8 % of all, have two sides that face the plane alike
     ties = 0.02 if name == "icosahedron" else 0.0
-    assert compare(model, poses(rng, model, WORLDS), ties=ties) >= {0, 1, 2, 3}
+    assert compare(model, poses(rng, model, WORLDS), ties=ties) >= {0, 2, 3}
 
 
 def test_a_prism_rests_on_mujocos_corners_of_its_many():
