@@ -60,7 +60,7 @@ struct Placed {
     /// From the eye [m].
     position: Option<[f32; 3]>,
     direction: [f32; 3],
-    /// Cosine of the cone's half angle.
+    /// Cosine of the cone's half angle; less than any where there is no cone.
     rim: f32,
 }
 
@@ -77,7 +77,11 @@ impl Lamps {
             lamp: *lamp,
             position: lamp.position.map(|at| single(vector::sub(at, eye))),
             direction: single(vector::unit(lamp.direction)),
-            rim: lamp.cutoff.cos(),
+            // a cosine may be a rounding below -1
+            rim: match lamp.cutoff < std::f32::consts::PI {
+                true => lamp.cutoff.cos(),
+                false => f32::NEG_INFINITY,
+            },
         };
         Lamps {
             all: lamps.iter().map(place).collect(),
