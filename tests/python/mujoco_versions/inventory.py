@@ -27,8 +27,8 @@ MODEL = {
     "derived from what is read": """body_rootid body_jntadr body_jntnum body_dofadr body_dofnum body_geomadr
         body_geomnum body_subtreemass body_contype body_conaffinity body_margin dof_bodyid dof_jntid dof_parentid
         dof_Madr dof_M0 tendon_type pair_signature actuator_length0
-        actuator_ctrladr actuator_outadr actuator_historyadr flg_adhesion flg_gravcomp flg_surfacevel
-        sensor_needstage""",
+        actuator_ctrladr actuator_outadr actuator_historyadr flg_gravcomp sensor_needstage""",
+    "read with adhesion and surface velocities": "flg_adhesion flg_surfacevel",
     "no effect in a step": "sensor_noise",
     "refused with flexes (nflex)": "flex*",
     "refused with plugins (nplugin)": "plugin* *_plugin",

@@ -211,6 +211,8 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         found[f"opt.{name}"] = as_bytes([getattr(mujoco, kind)(getattr(model.opt, name)).name])
     flags = [*_flags(mujoco.mjtDisableBit, model.opt.disableflags), *_flags(mujoco.mjtEnableBit, model.opt.enableflags)]
     found["opt.flags"] = as_bytes(flags)
+    # without it, MuJoCo has no pull of adhesion
+    found["flg_adhesion"] = np.array([bool(getattr(model, "flg_adhesion", True))], np.int32)
     found["stat.meaninertia"] = np.array([model.stat.meaninertia])
     for part, name in _LOOKS:
         found[f"vis.{part}.{name}"] = np.array(getattr(getattr(model.vis, part), name), np.float64).reshape(-1)

@@ -348,12 +348,18 @@ fn sticky(file: &ModelFile, kind: &str, refused: &mut Vec<String>) -> Result<(),
     let names = names(file, kind, count)?;
     // MuJoCo then drops the pull and keeps what balances it
     let is_off = has_flag(file, "mjDSBL_SPRING")? && has_flag(file, "mjDSBL_DAMPER")?;
+    // and it drops both of an adhesion that was set after it compiled the model, but not its contacts in the gap
+    let is_late = file.has("flg_adhesion") && file.integer("flg_adhesion")? == 0;
     for (name, force) in names.iter().zip(file.reals_or(&array, count, 0.0)?) {
         let wrong = [
             (force < 0.0, "a negative adhesion"),
             (
                 force > 0.0 && is_off,
                 "adhesion where springs and dampers are disabled",
+            ),
+            (
+                force > 0.0 && is_late,
+                "adhesion while the model's flg_adhesion is off",
             ),
         ];
         let wrong = wrong.iter().filter(|(is_wrong, _)| *is_wrong);

@@ -176,3 +176,15 @@ def test_what_is_refused_has_a_name(option, geom, pair, reason):
       <contact><pair name="p" geom1="f" geom2="g" {pair}/></contact></mujoco>"""
     with pytest.raises(SceneError, match=reason):
         tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(xml))
+
+
+def test_adhesion_that_is_set_later_needs_its_flag():
+    xml = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+      <body pos="0 0 .0999"><freejoint/><geom name="g" size=".1"/></body></worldbody></mujoco>"""
+    robot = mujoco.MjModel.from_xml_string(xml)
+    robot.geom_adhesion[1] = 2.0
+    with pytest.raises(SceneError, match="geom `g`: no support for adhesion while the model's flg_adhesion is off"):
+        tl.Scene.from_mujoco(robot)
+    robot.flg_adhesion = 1
+    with live(robot, worlds=1, fields=("qfrc_passive",)) as case:
+        np.testing.assert_allclose(case.sim.forward().qfrc_passive[0, 2], -2.0)
