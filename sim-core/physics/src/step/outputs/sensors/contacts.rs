@@ -195,7 +195,9 @@ fn turn<F: Num, V>(
     let [first, second] = tangents(normal, along);
     let frame = Mat3([normal, first, second]);
     [contact.force, contact.torque] = map([contact.force, contact.torque], |v| {
-        frame.transpose_mul(contact.frame.mul_add(v, Vec3::zero()))
+        // both share the normal: no rounding there, so that equal forces stay equal
+        let Vec3([_, x, y]) = frame.transpose_mul(contact.frame.mul_add(v, Vec3::zero()));
+        Vec3([v[0], x, y])
     });
     contact.frame = frame;
 }
