@@ -8,6 +8,11 @@ use std::path::Path;
 
 use rustix::fs::{AtFlags, CWD, FallocateFlags, OFlags, fallocate, linkat};
 
+use crate::unix::files::uninterrupted;
+
+/// What one call takes of a file: short enough that signals, which undo a call, leave one to end [bytes].
+const TAKEN_AT_ONCE: u64 = 16 << 20;
+
 /// A file of this user without a name.
 #[derive(Debug)]
 pub struct NewFile(File);
@@ -23,10 +28,12 @@ impl NewFile {
         options.read(true).write(true).mode(0o600);
         let flags = OFlags::TMPFILE.bits() as i32;
         let file = options.custom_flags(flags).open(folder)?;
-        let take = |first, bytes| fallocate(&file, FallocateFlags::empty(), first, bytes);
         match ends {
-            None => take(0, bytes)?,
-            Some(end) => take(0, end).and_then(|()| take(bytes - end, end))?,
+            None => take(&file, 0, bytes)?,
+            Some(end) => {
+                take(&file, 0, end)?;
+                take(&file, bytes - end, end)?;
+            }
         }
         Ok(NewFile(file))
     }
@@ -52,5 +59,14 @@ impl NewFile {
 /// # Errors
 /// Those of the system; the kind is `StorageFull` where the pages are not there.
 pub fn reserve(file: &File, bytes: u64) -> io::Result<()> {
-    Ok(fallocate(file, FallocateFlags::empty(), 0, bytes)?)
+    take(file, 0, bytes)
+}
+
+fn take(file: &File, first: u64, bytes: u64) -> io::Result<()> {
+    let end = first + bytes;
+    for start in (first..end).step_by(TAKEN_AT_ONCE as usize) {
+        let length = TAKEN_AT_ONCE.min(end - start);
+        uninterrupted(|| Ok(fallocate(file, FallocateFlags::empty(), start, length)?))?;
+    }
+    Ok(())
 }

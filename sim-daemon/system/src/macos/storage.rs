@@ -8,6 +8,7 @@ use rustix::fs::{FallocateFlags, fallocate};
 
 use super::files::private;
 pub use crate::portable::storage::{NewFile, reserve};
+use crate::unix::files::uninterrupted;
 
 impl NewFile {
     /// Makes a file of so many bytes in a folder, and takes their pages now, so that nobody else can: all of them, since this
@@ -17,7 +18,7 @@ impl NewFile {
     /// Those of the system; the kind is `StorageFull` where the pages are not there.
     pub fn create(folder: &Path, bytes: u64, _ends: Option<u64>) -> io::Result<NewFile> {
         let new = NewFile::empty(folder, &mut private())?;
-        fallocate(new.file(), FallocateFlags::empty(), 0, bytes)?;
+        uninterrupted(|| Ok(fallocate(new.file(), FallocateFlags::empty(), 0, bytes)?))?;
         Ok(new)
     }
 

@@ -99,7 +99,7 @@ pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
 /// # Errors
 /// Those of the system.
 pub fn read_at(file: &File, bytes: &mut [u8], at: u64) -> io::Result<usize> {
-    file.read_at(bytes, at)
+    uninterrupted(|| file.read_at(bytes, at))
 }
 
 /// Writes to a place of a file.
@@ -115,7 +115,7 @@ pub fn write_at(file: &File, bytes: &[u8], at: u64) -> io::Result<()> {
 /// # Errors
 /// Those of the system.
 pub fn try_lock(file: &File) -> io::Result<bool> {
-    taken(file.try_lock())
+    uninterrupted(|| taken(file.try_lock()))
 }
 
 /// Takes a share of the lock if nobody has it for himself, and says whether it did.
@@ -123,7 +123,7 @@ pub fn try_lock(file: &File) -> io::Result<bool> {
 /// # Errors
 /// Those of the system.
 pub fn try_lock_shared(file: &File) -> io::Result<bool> {
-    taken(file.try_lock_shared())
+    uninterrupted(|| taken(file.try_lock_shared()))
 }
 
 /// Gives the lock back.
@@ -131,7 +131,17 @@ pub fn try_lock_shared(file: &File) -> io::Result<bool> {
 /// # Errors
 /// Those of the system.
 pub fn unlock(file: &File) -> io::Result<()> {
-    file.unlock()
+    uninterrupted(|| file.unlock())
+}
+
+/// Repeats a call of the system that a signal handler interrupts; the standard library does so for most others.
+pub(crate) fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    loop {
+        match call() {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            done => return done,
+        }
+    }
 }
 
 fn taken(lock: Result<(), TryLockError>) -> io::Result<bool> {
