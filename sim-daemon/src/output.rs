@@ -1,6 +1,6 @@
 //! What a command writes: files that a user names, whole or not at all, and results on standard output.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -18,12 +18,37 @@ pub(crate) use sim_system::files::open_to_write as open;
 /// # Errors
 /// What the system says.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
+    if there(path)?.is_some_and(|there| !there.is_file()) {
         return open(path, OpenOptions::new().write(true))?.write_all(bytes);
     }
     let mut part = Part::new(path)?;
     part.file.write_all(bytes)?;
     part.keep()
+}
+
+/// What is at a path, behind a link.
+///
+/// # Errors
+/// What the system says, where it cannot tell: a guess might replace a device, or what is private by what is not.
+pub(crate) fn there(path: &Path) -> io::Result<Option<Metadata>> {
+    absent(fs::metadata(path))
+}
+
+/// Where a file goes: of a link that leads somewhere, its target.
+fn target(place: &Path) -> io::Result<PathBuf> {
+    let is_link = absent(fs::symlink_metadata(place))?.is_some_and(|there| there.is_symlink());
+    let behind = is_link.then(|| absent(fs::canonicalize(place)));
+    Ok(behind
+        .transpose()?
+        .flatten()
+        .unwrap_or_else(|| place.to_owned()))
+}
+
+fn absent<T>(found: io::Result<T>) -> io::Result<Option<T>> {
+    match found {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 /// A file in the making, beside its place: dropping it removes it, and what was in its place stays.
@@ -40,10 +65,10 @@ impl Part {
     /// # Errors
     /// What the system says.
     pub(crate) fn new(place: &Path) -> io::Result<Part> {
-        let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
+        let target = target(place)?;
         let path = beside(&target);
         let file = File::create_new(&path)?;
-        Part::from_file(file, path, target)
+        Part::made(file, path, target).with_permissions()
     }
 
     /// The same under a name that a user knows, such as `run.part.tlrec`: if the process is killed, it stays, and the next one
@@ -52,7 +77,7 @@ impl Part {
     /// # Errors
     /// `ResourceBusy` where another process writes it; what the system says.
     pub(crate) fn named(place: &Path) -> io::Result<Part> {
-        let target = fs::canonicalize(place).unwrap_or_else(|_| place.to_owned());
+        let target = target(place)?;
         let mut name = target.file_stem().unwrap_or_default().to_owned();
         name.push(".part");
         if let Some(ending) = target.extension() {
@@ -62,11 +87,14 @@ impl Part {
         let path = target.with_file_name(name);
         loop {
             match File::create_new(&path) {
-                // who removes it in between has taken it for that of a killed process
-                Ok(file) if files::try_lock(&file)? && files::is_at(&file, &path)? => {
-                    return Part::from_file(file, path, target);
+                Ok(file) => {
+                    let mut part = Part::made(file, path.clone(), target.clone());
+                    // who removes it in between has taken it for that of a killed process
+                    if files::try_lock(&part.file)? && files::is_at(&part.file, &path)? {
+                        return part.with_permissions();
+                    }
+                    part.kept = true;
                 }
-                Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                     let there = fs::symlink_metadata(&path)?;
                     if !there.is_file() || !files::try_lock(&File::open(&path)?)? {
@@ -79,18 +107,21 @@ impl Part {
         }
     }
 
-    fn from_file(file: File, path: PathBuf, target: PathBuf) -> io::Result<Part> {
-        let part = Part {
+    fn made(file: File, path: PathBuf, target: PathBuf) -> Part {
+        Part {
             file,
             path,
             target,
             kept: false,
-        };
-        // first: what it replaces may be private
-        if let Ok(there) = fs::metadata(&part.target) {
-            part.file.set_permissions(there.permissions())?;
         }
-        Ok(part)
+    }
+
+    /// First: what it replaces may be private.
+    fn with_permissions(self) -> io::Result<Part> {
+        if let Some(there) = there(&self.target)? {
+            self.file.set_permissions(there.permissions())?;
+        }
+        Ok(self)
     }
 
     /// The file to write, for a thread of its own.

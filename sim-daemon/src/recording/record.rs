@@ -169,7 +169,9 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
         ErrorKind::NotFound => failed(out, "its folder is not there; make it first"),
         _ => failed(out, format!("cannot be made: {error}")),
     };
-    if args.force && out.is_file() {
+    // what cannot be told must not be cut as a device is
+    let there = output::there(out).map_err(not_made)?;
+    if args.force && there.is_some_and(|there| there.is_file()) {
         // a user who may not write it may not replace it either
         output::open(out, OpenOptions::new().write(true)).map_err(not_made)?;
         let part = Part::named(out).map_err(not_made)?;
