@@ -3,7 +3,7 @@
 //! A recorder that is too slow loses entries: a gap. It then takes a new journal, which begins with the state of all worlds,
 //! so that a replay goes on behind the gap.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -16,7 +16,7 @@ use sim_protocol::{
 };
 use sim_system::{process, signals};
 
-use super::blocks::BLOCK_MAX;
+use super::blocks::{BLOCK_MAX, HEAD};
 use super::failure::failed;
 use super::records::{Record, RecordedCommand};
 use super::writer::{Stopped, Writer};
@@ -188,6 +188,13 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
     Ok((file, None))
 }
 
+/// Removes a file without a block, which cannot be replayed, and says whether it did.
+fn remove_empty(out: &Path) -> bool {
+    let is_empty = |there: &Metadata| there.is_file() && there.len() <= HEAD as u64;
+    matches!(output::there(out), Ok(Some(there)) if is_empty(&there))
+        && fs::remove_file(out).is_ok()
+}
+
 /// Bytes of a frame's arrays: no entry is much larger.
 fn frame_bytes(description: &Description) -> usize {
     let arrays = description.fields.iter();
@@ -261,7 +268,10 @@ impl Recorder<'_> {
                 }
                 Err(error) => return Err(End::Failed(error.into())),
             }
-            self.writer.flush_old()?;
+            // the first block has a state, so that what stays of a file can be replayed
+            if self.has_begun {
+                self.writer.flush_old()?;
+            }
             self.report_progress();
         }
     }
@@ -426,6 +436,7 @@ impl Recorder<'_> {
         let bytes = self.writer.close().map_err(|error| {
             let cure = match self.part {
                 Some(_) => "the old recording stays; make room and record again",
+                None if remove_empty(out) => "nothing was recorded; make room and record again",
                 None => "what is there can be replayed, for more make room and record again",
             };
             failed(out, format!("cannot be written: {error}; {cure}"))

@@ -114,3 +114,12 @@ def test_a_recording_that_replaces_another_is_whole(stepping: str, tmp_path: Pat
     for failpoint, done in each_call(command, out, OLD):
         if done.code != 0:
             assert out.read_bytes() == OLD, failpoint
+
+
+def test_what_stays_of_a_recording_can_be_replayed(stepping: str, tmp_path: Path) -> None:
+    out = tmp_path / "kept" / "run.tlrec"
+    out.parent.mkdir()
+    for failpoint, done in each_call([*COMMAND, "record", stepping, str(out), "--frames=3"], out, None):
+        if out.exists():
+            replayed = subprocess.run([*COMMAND, "replay", str(out)], capture_output=True, text=True, check=False)
+            assert replayed.returncode == 0, f"{failpoint}: {done.err}{replayed.stderr}"
