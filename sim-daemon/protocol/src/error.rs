@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use sim_system::files::free_bytes;
+use sim_system::files::{free_bytes, shared_memory};
 use sim_system::{open_files, process};
 
 use crate::memory::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
@@ -337,7 +337,7 @@ pub enum ProtocolError {
     Interrupted,
 
     /// The transport failed.
-    #[error("shared-memory transport: {action}: {problem}")]
+    #[error("shared-memory transport in {}: {action}: {problem}", shared_memory())]
     Transport {
         /// What was tried.
         action: String,

@@ -212,7 +212,7 @@ impl DaemonPaths {
     /// What an open lock file says, whatever became of its name.
     pub(crate) fn presence_in(&self, lock: &File) -> Result<Presence, ProtocolError> {
         match files::try_lock_shared(lock) {
-            Ok(false) => Ok(read_beacon(lock)),
+            Ok(false) => read_beacon(lock).map_err(|error| self.lock_error(&error)),
             Err(error) => Err(self.lock_error(&error)),
             // the file may stay open, so closing it does not give the lock back
             Ok(true) => match files::unlock(lock) {
@@ -314,18 +314,16 @@ pub(crate) fn names_with_lock(root: Option<&Path>) -> Result<Vec<DaemonPaths>, P
 /// The line of a daemon that starts; then comes its [`Beacon`].
 pub(crate) const STARTING: &str = "tightloop starting\n";
 
-/// What the holder of the lock says.
-fn read_beacon(file: &File) -> Presence {
+/// What the holder of the lock says. A file that cannot be read says nothing about it.
+fn read_beacon(file: &File) -> std::io::Result<Presence> {
     let mut bytes = [0; 128];
-    let text = files::read_at(file, &mut bytes, 0)
-        .ok()
-        .and_then(|read| str::from_utf8(&bytes[..read]).ok());
-    match text {
+    let read = files::read_at(file, &mut bytes, 0)?;
+    Ok(match str::from_utf8(&bytes[..read]).ok() {
         Some(STARTING) => Presence::Starting,
         text => text
             .and_then(parse_beacon)
             .map_or(Presence::Silent, Presence::Running),
-    }
+    })
 }
 
 fn parse_beacon(text: &str) -> Option<Beacon> {

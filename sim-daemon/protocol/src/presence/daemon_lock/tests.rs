@@ -35,6 +35,21 @@ fn a_name_is_taken_once_and_leaves_nothing() {
 }
 
 #[test]
+fn a_lock_file_that_cannot_be_read_is_an_error_and_no_other_daemon() {
+    let root = root("unread");
+    let paths = DaemonPaths::new(Some(&root), "unread").unwrap();
+    let mut held = DaemonLock::take(&paths).unwrap();
+    held.announce(7, 1).unwrap();
+    // the system reads nothing from what is open for writing alone
+    let unread = File::options().append(true).open(paths.lock_path());
+    let error = paths.presence_in(&unread.unwrap()).unwrap_err().to_string();
+    let path = format!("{:?}", paths.lock_path());
+    assert!(error.contains(&path), "{error}");
+    drop(held);
+    fs::remove_dir(&root).unwrap();
+}
+
+#[test]
 fn a_daemon_that_is_ended_at_once_takes_its_files_and_the_request_with_it() {
     let root = root("at-once");
     let paths = DaemonPaths::new(Some(&root), "busy").unwrap();
