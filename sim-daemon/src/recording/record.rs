@@ -169,7 +169,7 @@ fn create(args: &cli::Record) -> Result<(File, Option<Part>), DaemonError> {
         ErrorKind::NotFound => failed(out, "its folder is not there; make it first"),
         _ => failed(out, format!("cannot be made: {error}")),
     };
-    // what cannot be told must not be cut as a device is
+    // where the system cannot tell, nothing is cut
     let there = output::there(out).map_err(not_made)?;
     if args.force && there.is_some_and(|there| there.is_file()) {
         // a user who may not write it may not replace it either

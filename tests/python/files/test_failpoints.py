@@ -11,8 +11,11 @@ from pathlib import Path
 import pytest
 
 import tightloop as tl
-from failpoints import REMOVALS, Failpoint, Run, failpoints, run
+from failpoints import REMOVALS, Failpoint, Run, failpoints, is_supported, run
 from processes import started
+from tiers import sweep
+
+pytestmark = pytest.mark.skipif(not is_supported(), reason="no process may filter the system calls of another one here")
 
 COMMAND = [sys.executable, "-m", "tightloop"]
 OLD = b"what was there"
@@ -79,8 +82,8 @@ def each_call(command: list[str], out: Path, there: bytes | None) -> Iterator[tu
         yield failpoint, done
 
 
-@pytest.mark.parametrize("there", [None, OLD])
-@pytest.mark.parametrize("what", ["whole_file", "scene", "picture"])
+@pytest.mark.parametrize("there", sweep([OLD, None], daily=1))
+@pytest.mark.parametrize("what", sweep(["whole_file", "scene", "picture"], daily=1))
 def test_a_file_is_the_old_one_or_the_new_one(
     scene: Path, pendulum_urdf: Path, tmp_path: Path, what: str, there: bytes | None
 ) -> None:
@@ -97,6 +100,7 @@ def test_a_file_is_the_old_one_or_the_new_one(
             assert (out.read_bytes() if out.exists() else None) == there, failpoint
 
 
+@pytest.mark.nightly
 def test_a_private_file_stays_private(scene: Path, tmp_path: Path) -> None:
     out = tmp_path / "kept" / "file"
     out.parent.mkdir()

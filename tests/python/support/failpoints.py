@@ -146,6 +146,19 @@ class _Program(ctypes.Structure):
     _fields_ = [("length", ctypes.c_uint16), ("filter", ctypes.POINTER(_Instruction))]
 
 
+class Unsupported(OSError):
+    """The kernel, or what this process runs in, lets no program filter the calls of another one."""
+
+
+def is_supported() -> bool:
+    """Whether calls can be watched here."""
+    try:
+        run([sys.executable, "-c", ""], [])
+    except Unsupported:
+        return False
+    return True
+
+
 def run(
     command: Sequence[str | Path],
     watched: Sequence[Path],
@@ -165,6 +178,7 @@ def run(
 
     Raises:
         subprocess.TimeoutExpired: The program did not end.
+        Unsupported: Calls cannot be watched here.
     """
     ours, theirs = socket.socketpair()
     done = Run(0, "", "")
@@ -178,7 +192,11 @@ def run(
             text=True,
             pass_fds=[theirs.fileno()],
         )
-        _, (listener,), _, _ = socket.recv_fds(ours, 1, 1)
+        theirs.close()
+        _, listeners, _, _ = socket.recv_fds(ours, 1, 1)
+    if not listeners:
+        raise Unsupported(process.communicate()[1])
+    (listener,) = listeners
     answering = threading.Thread(target=_answer, args=(listener, [*watched], failpoint, done))
     answering.start()
     try:

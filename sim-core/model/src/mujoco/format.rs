@@ -98,7 +98,7 @@ impl ModelFile {
         shape.and_then(|shape| shape.first().copied()).unwrap_or(0)
     }
 
-    /// How many entries a row of an array has.
+    /// Entries per row of an array.
     pub fn columns(&self, name: &str) -> usize {
         let shape = self.arrays.get(name).map(|(shape, _)| shape);
         shape.and_then(|shape| shape.get(1).copied()).unwrap_or(0)
