@@ -51,6 +51,18 @@ def test_worlds_are_those_of_the_cpu_and_frames_come_without_a_copy():
     np.testing.assert_array_equal(seen["cpu"][4], seen["gpu"][4])
 
 
+@pytest.mark.parametrize("field", ["qpos", "qvel"])
+def test_a_field_made_of_the_state_needs_no_other_field(field):
+    seen = {}
+    for device in ("cpu", "gpu"):
+        with tl.launch(scene(), worlds=3, device=device, fields=(field,)) as sim:
+            for frame in range(3):
+                last = sim.step(joint_target_q=targets(frame)[:3])
+            seen[device] = np.array(getattr(last, field))
+    assert np.abs(seen["cpu"]).max() > 1e-3
+    np.testing.assert_allclose(seen["gpu"], seen["cpu"], atol=1e-5)
+
+
 def test_a_new_client_gets_frames_in_memory_of_its_own():
     with tl.launch(scene(), worlds=WORLDS, device="gpu") as sim:
         sim.step(joint_target_q=targets(0))

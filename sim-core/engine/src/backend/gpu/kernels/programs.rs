@@ -2,7 +2,7 @@
 
 use super::places::Places;
 use crate::backend::gather::gather;
-use sim_physics::arrays::{Array, Field};
+use sim_physics::arrays::{Array, Field, Source};
 use sim_physics::constants::Constants;
 use sim_physics::lane::Num;
 use sim_physics::schedule::step_stages;
@@ -207,7 +207,15 @@ fn evaluation(
     computed: &[(Field, usize)],
     wanted: &[Array],
 ) -> Result<(Recording, ProgramOptions), RecordError> {
-    let (reads, written) = effects(stages);
+    let (mut reads, written) = effects(stages);
+    // fields that are made of the state may read what no stage does
+    for &(field, _) in computed {
+        if let Source::Computed(arrays) = field.row().source {
+            let is_missing = |array: &&Array| !reads.contains(array) && !written.contains(array);
+            let missing: Vec<Array> = arrays.iter().filter(is_missing).copied().collect();
+            reads.extend(missing);
+        }
+    }
     // contacts that do not fit are counted in what is shown, too
     let is_kept = |array: &Array| wanted.contains(array) || *array == Array::LeftOut;
     let writes: Vec<Array> = written.into_iter().filter(is_kept).collect();
