@@ -56,6 +56,7 @@ def test_a_field_made_of_the_state_needs_no_other_field(field):
     seen = {}
     for device in ("cpu", "gpu"):
         with tl.launch(scene(), worlds=3, device=device, fields=(field,)) as sim:
+            last = sim.reset()
             for frame in range(3):
                 last = sim.step(joint_target_q=targets(frame)[:3])
             seen[device] = np.array(getattr(last, field))
