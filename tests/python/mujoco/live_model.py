@@ -67,6 +67,18 @@ class Live:
                 getattr(data, name)[:] = getattr(states, name)[world]
             yield data
 
+    def assert_steps_are_mujocos(self, states: States, steps: int, tolerance: float) -> None:
+        """Step both sides from these states, and compare where the bodies are."""
+        self.place(states)
+        worlds = list(self.data(states))
+        for _ in range(steps):
+            frame = self.sim.step()
+            for data in worlds:
+                mujoco.mj_step(self.model, data)
+        for world, data in enumerate(worlds):
+            assert relative(frame.qpos[world], data.qpos) < tolerance
+            assert relative(frame.qvel[world], data.qvel) < 10 * tolerance
+
 
 @contextmanager
 def live(

@@ -69,26 +69,12 @@ def compare_forces(case: Live, tolerance: float, *, speed: float = 0.2) -> None:
         assert relative(frame.sensordata[world], data.sensordata) < tolerance
 
 
-def compare_steps(case: Live, tolerance: float) -> None:
-    """Step both sides and compare where the bodies are."""
-    states = case.states(3, spread=0.0, speed=0.05)
-    case.place(states)
-    worlds = list(case.data(states))
-    for _ in range(STEPS):
-        frame = case.sim.step()
-        for data in worlds:
-            mujoco.mj_step(case.model, data)
-    for world, data in enumerate(worlds):
-        assert relative(frame.qpos[world], data.qpos) < tolerance
-        assert relative(frame.qvel[world], data.qvel) < 10 * tolerance
-
-
 @pytest.mark.parametrize("condim", [1, 3, 4, 6])
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 def test_contacts_pull_as_in_mujoco(cone, condim):
     with live(model(cone=cone, condim=condim), worlds=3, fields=FIELDS) as case:
         compare_forces(case, 1e-8)
-        compare_steps(case, 1e-6)
+        case.assert_steps_are_mujocos(case.states(3, spread=0.0, speed=0.05), STEPS, 1e-6)
 
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
@@ -101,7 +87,7 @@ def test_contacts_in_the_gap_stop_what_is_fast(cone):
 def test_integrators_take_it(integrator):
     with live(model(integrator=integrator), worlds=2, fields=FIELDS) as case:
         compare_forces(case, 1e-8)
-        compare_steps(case, 1e-6)
+        case.assert_steps_are_mujocos(case.states(3, spread=0.0, speed=0.05), STEPS, 1e-6)
 
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])

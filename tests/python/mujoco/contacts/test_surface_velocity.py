@@ -62,33 +62,19 @@ def compare_forces(case: Live, tolerance: float) -> None:
     assert touched == set(range(case.model.ngeom))
 
 
-def compare_steps(case: Live, tolerance: float) -> None:
-    """Step both sides and compare where the bodies are."""
-    states = case.states(3, spread=0.0, speed=0.3)
-    case.place(states)
-    worlds = list(case.data(states))
-    for _ in range(STEPS):
-        frame = case.sim.step()
-        for data in worlds:
-            mujoco.mj_step(case.model, data)
-    for world, data in enumerate(worlds):
-        assert relative(frame.qpos[world], data.qpos) < tolerance
-        assert relative(frame.qvel[world], data.qvel) < 10 * tolerance
-
-
 @pytest.mark.parametrize("condim", [1, 3, 4, 6])
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 def test_surfaces_drive_what_touches_them_as_in_mujoco(cone, condim):
     with live(model(cone=cone, condim=condim), worlds=3, fields=FIELDS) as case:
         compare_forces(case, 1e-8)
-        compare_steps(case, 1e-6)
+        case.assert_steps_are_mujocos(case.states(3, spread=0.0, speed=0.3), STEPS, 1e-6)
 
 
 @pytest.mark.parametrize("integrator", ["implicitfast", "implicit", "RK4"])
 def test_integrators_take_them(integrator):
     with live(model(integrator=integrator), worlds=2, fields=FIELDS) as case:
         compare_forces(case, 1e-8)
-        compare_steps(case, 1e-6)
+        case.assert_steps_are_mujocos(case.states(3, spread=0.0, speed=0.3), STEPS, 1e-6)
 
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])

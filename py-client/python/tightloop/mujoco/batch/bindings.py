@@ -52,8 +52,8 @@ class Bindings:
         self.derived: dict[str, Array] = {}
         self._copies: list[_Copy] = []
         self._state: _Copy | None = None
-        # the rows when all that was written had been brought to them
-        self._base = self.rows.copy()
+        # with it, the rows when all that was written had been brought to them
+        self._base = self.last
         self._arrays: dict[str, Array] = {}
 
     def get(self, name: str, dtype: DTypeLike | None) -> Array:
@@ -77,6 +77,7 @@ class Bindings:
     def _made(self, name: str, dtype: np.dtype[Any]) -> Array:
         if name == "state":
             self._state = _Copy(self.last.copy(), self.rows, self.last.copy())
+            self._base = self.last.copy()
             return self._state.array
         if name == "warning":
             return self.warnings
@@ -101,7 +102,8 @@ class Bindings:
             _bring(copy, ids, copy.of)
         for copy in self._all:
             copy.written[ids] = copy.array[ids]
-        self._base[ids] = self.rows[ids]
+        if self._state is not None:
+            self._base[ids] = self.rows[ids]
 
     def collect_fields(self, ids: Ids) -> None:
         """Bring what was written into fields, and forget what was written into the state as a whole."""
@@ -125,7 +127,8 @@ class Bindings:
         for copy in self._all:
             copy.array[ids] = copy.of[ids]
             copy.written[ids] = copy.array[ids]
-        self._base[ids] = self.rows[ids]
+        if self._state is not None:
+            self._base[ids] = self.rows[ids]
 
     @property
     def _all(self) -> list[_Copy]:
