@@ -1,0 +1,237 @@
+//! Processes: threads that live and die together.
+
+use crate::world::{self, World, is_on, me, with};
+
+/// A process, dead ones included until another gets their number.
+#[derive(Debug, Clone)]
+pub(crate) struct Process {
+    /// No other process has it, ever.
+    pub(crate) serial: u64,
+    pub(crate) parent: u32,
+    pub(crate) state: State,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum State {
+    Running,
+    Stopped,
+    Dead,
+}
+
+/// The number of the first process that a run makes.
+const FIRST: u32 = 100;
+
+impl World {
+    /// Whether a thread may go on at all.
+    pub(crate) fn runs(&self, task: usize) -> bool {
+        let process = self.tasks.get(task).map_or(0, |task| task.process);
+        self.processes
+            .get(&process)
+            .is_none_or(|process| process.state == State::Running)
+    }
+
+    pub(crate) fn is_alive(&self, pid: u32) -> bool {
+        pid == 0
+            || self
+                .processes
+                .get(&pid)
+                .is_some_and(|process| process.state != State::Dead)
+    }
+
+    /// The process of the calling thread; 0 is the test's own.
+    pub(crate) fn process(&self) -> u32 {
+        self.tasks.get(me()).map_or(0, |task| task.process)
+    }
+
+    fn serial(&self, pid: u32) -> u64 {
+        self.processes.get(&pid).map_or(0, |process| process.serial)
+    }
+
+    fn number(&mut self) -> u32 {
+        let dead: Vec<u32> = self
+            .processes
+            .iter()
+            .filter(|(_, process)| process.state == State::Dead)
+            .map(|(pid, _)| *pid)
+            .collect();
+        // a number may be used again at once
+        if !dead.is_empty() && self.rng.bool() {
+            return dead[self.rng.usize(0..dead.len())];
+        }
+        self.processes
+            .last_key_value()
+            .map_or(FIRST, |(pid, _)| pid + 1)
+    }
+}
+
+/// The number of the calling process.
+pub fn id() -> u32 {
+    match is_on() {
+        true => with(|world| world.process()),
+        false => 0,
+    }
+}
+
+/// A process, also once another one has its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Handle {
+    /// Its number.
+    pub pid: u32,
+    serial: u64,
+}
+
+impl Handle {
+    /// The calling process.
+    pub fn this() -> Handle {
+        let pid = id();
+        Handle::of(pid)
+    }
+
+    fn of(pid: u32) -> Handle {
+        let serial = with(|world| world.serial(pid));
+        Handle { pid, serial }
+    }
+
+    /// Whether it lives, stopped or not.
+    pub fn is_alive(self) -> bool {
+        with(|world| world.is_alive(self.pid) && world.serial(self.pid) == self.serial)
+    }
+
+    /// Kills it.
+    pub fn kill(self) {
+        if self.is_alive() {
+            kill(self.pid);
+        }
+    }
+
+    /// Stops it until [`Handle::resume`].
+    pub fn stop(self) {
+        if self.is_alive() {
+            stop(self.pid);
+        }
+    }
+
+    /// Lets it go on.
+    pub fn resume(self) {
+        if self.is_alive() {
+            resume(self.pid);
+        }
+    }
+}
+
+/// As [`start`], and returns the number alone.
+pub fn spawn(main: impl FnOnce() + Send + 'static) -> u32 {
+    start(main).pid
+}
+
+/// Starts a process, a child of the calling one, whose first thread calls `main`; it exits when that returns.
+pub fn start(main: impl FnOnce() + Send + 'static) -> Handle {
+    let handle = with(|world| {
+        let (pid, parent) = (world.number(), world.process());
+        world.serials += 1;
+        let (serial, state) = (world.serials, State::Running);
+        world.processes.insert(
+            pid,
+            Process {
+                serial,
+                parent,
+                state,
+            },
+        );
+        world.line(|| format!("starts process {pid}"));
+        Handle { pid, serial }
+    });
+    crate::thread::begin(handle, move || {
+        main();
+        exit();
+    });
+    handle
+}
+
+/// Ends the calling process, whatever its other threads do.
+pub fn exit() -> ! {
+    kill(id());
+    loop {
+        crate::thread::block(u64::MAX);
+    }
+}
+
+/// Kills a process: no thread of it goes on, and what the system keeps for it is let go of.
+pub fn kill(pid: u32) {
+    with(|world| {
+        let Some(process) = world.processes.get_mut(&pid) else {
+            return;
+        };
+        if process.state == State::Dead {
+            return;
+        }
+        process.state = State::Dead;
+        // threads stay where they are; one with the same number must not bring them back
+        for task in &mut world.tasks {
+            if task.process == pid {
+                (task.process, task.wake) = (u32::MAX, u64::MAX);
+            }
+        }
+        world.files.release(pid);
+        world.wires.release(pid);
+        world.system.release(pid);
+        world.line(|| format!("process {pid} is dead"));
+    });
+    if is_on() && id() == u32::MAX {
+        crate::thread::block(u64::MAX);
+    }
+}
+
+/// Stops a process until [`resume`].
+pub fn stop(pid: u32) {
+    change(pid, State::Running, State::Stopped);
+    world::step("stops a process");
+}
+
+/// Lets a stopped process go on.
+pub fn resume(pid: u32) {
+    change(pid, State::Stopped, State::Running);
+}
+
+fn change(pid: u32, from: State, to: State) {
+    with(|world| {
+        if let Some(process) = world.processes.get_mut(&pid)
+            && process.state == from
+        {
+            process.state = to;
+            world.line(|| format!("process {pid} is {to:?}"));
+        }
+    });
+}
+
+/// Whether a process lives, stopped ones included.
+pub fn is_alive(pid: u32) -> bool {
+    with(|world| world.is_alive(pid))
+}
+
+/// The processes that live.
+pub fn living() -> Vec<u32> {
+    with(|world| {
+        world
+            .processes
+            .keys()
+            .copied()
+            .filter(|pid| world.is_alive(*pid))
+            .collect()
+    })
+}
+
+/// The parent of the calling process; 1 once that is dead.
+pub fn parent() -> u32 {
+    with(|world| {
+        let parent = world
+            .processes
+            .get(&world.process())
+            .map_or(0, |process| process.parent);
+        if parent == 0 || world.is_alive(parent) {
+            parent
+        } else {
+            1
+        }
+    })
+}
