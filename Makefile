@@ -39,7 +39,7 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test test-all docs test-rl test-mjlab train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -118,6 +118,10 @@ kills: wheel $(VENV)/.dev ## kill and stop every process at random moments (ROUN
 
 soak: wheel $(VENV)/.dev ## full speed with guests that come, go and die; the curve into benches/results (HOURS=1)
 	$(PYTHON) -m benches soak --hours $(HOURS)
+
+# Not part of `test`, which runs 200 seeds. A failure prints its seed, and the least plan that fails.
+simulate: ## daemon, clients and observers on a simulated machine (MINUTES=30 SEED=1)
+	cargo run --release --quiet -p sim-protocol-simulated --bin simulate -- --minutes $(or $(MINUTES),30) --seed $(SEED)
 
 # A failure prints its seed. Properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)

@@ -1,7 +1,7 @@
 //! Which package has which door, and where `unsafe` may stand.
 
-/// The only door of each heavy package.
-pub const DOORS: [(&str, &str); 24] = [
+/// The doors of each heavy package: one, and that of a simulation.
+pub const DOORS: [(&str, &str); 26] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/shader/module.rs"),
     ("wgpu", "sim-core/device/src"),
@@ -16,8 +16,10 @@ pub const DOORS: [(&str, &str); 24] = [
     ("rayon", "sim-core/engine/src/backend/cpu"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
+    ("iceoryx2", "sim-daemon/simulated/machine/src"),
     ("iceoryx2_cal", "sim-daemon/protocol/src"),
     ("clap", "sim-daemon/src/cli"),
+    ("clap", "sim-daemon/simulated/protocol/src/main.rs"),
     ("clap_complete", "sim-daemon/src/cli/pages.rs"),
     ("clap_mangen", "sim-daemon/src/cli/pages.rs"),
     ("lz4_flex", "sim-daemon/src/recording/blocks.rs"),
@@ -29,8 +31,8 @@ pub const DOORS: [(&str, &str); 24] = [
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 51] = [
-    "py-client/src/frame.rs",                              // NumPy views
+pub const UNSAFE: [&str; 57] = [
+    "py-client/src/frame.rs",                                     // NumPy views
     "py-client/src/xla/abi.rs", // structs and arrays of XLA's foreign functions
     "sim-core/compile/src/lib.rs", // runs machine code
     "sim-core/device/src/host_pages.rs", // imports pages of the host
@@ -70,15 +72,21 @@ pub const UNSAFE: [&str; 51] = [
     "sim-daemon/protocol/src/memory/port.rs", // ports that are dropped or left alone
     "sim-daemon/protocol/src/memory/reentrant.rs", // a value that a lock abandons
     "sim-daemon/protocol/src/memory/storage.rs", // what mapped files hold
-    "sim-daemon/src/environment.rs",    // a variable, set while there is one thread
-    "sim-daemon/src/serve/shown.rs",    // samples that a device writes to
-    "sim-daemon/system/src/unix/faults.rs", // a handler of missing pages
-    "sim-daemon/system/src/unix/files.rs", // the descriptor of a listener
-    "sim-daemon/system/src/unix/forks.rs", // a handler of forks
-    "sim-daemon/system/src/windows/clock.rs", // calls of Windows
-    "sim-daemon/system/src/windows/cores.rs", // as clock.rs
-    "sim-daemon/system/src/windows/faults.rs", // the same function, which does nothing
-    "sim-daemon/system/src/windows/files.rs", // as clock.rs
-    "sim-daemon/system/src/windows/process.rs", // as clock.rs
-    "sim-daemon/system/src/windows/storage.rs", // as clock.rs
+    "sim-daemon/simulated/machine/src/iceoryx2/port/listener.rs", // as waiting/park.rs, where it does nothing
+    "sim-daemon/simulated/machine/src/iceoryx2/port/loan.rs",     // loans, as iceoryx2 has them
+    "sim-daemon/simulated/machine/src/iceoryx2/sample.rs",        // samples, as iceoryx2 has them
+    "sim-daemon/simulated/machine/src/iceoryx2/service/builder/mod.rs", // facts of types that the caller sets
+    "sim-daemon/simulated/machine/src/iceoryx2/slot.rs", // slots that several ports see
+    "sim-daemon/simulated/machine/src/system/files.rs", // as waiting/park.rs, where it does nothing
+    "sim-daemon/src/environment.rs",                    // a variable, set while there is one thread
+    "sim-daemon/src/serve/shown.rs",                    // samples that a device writes to
+    "sim-daemon/system/src/unix/faults.rs",             // a handler of missing pages
+    "sim-daemon/system/src/unix/files.rs",              // the descriptor of a listener
+    "sim-daemon/system/src/unix/forks.rs",              // a handler of forks
+    "sim-daemon/system/src/windows/clock.rs",           // calls of Windows
+    "sim-daemon/system/src/windows/cores.rs",           // as clock.rs
+    "sim-daemon/system/src/windows/faults.rs",          // the same function, which does nothing
+    "sim-daemon/system/src/windows/files.rs",           // as clock.rs
+    "sim-daemon/system/src/windows/process.rs",         // as clock.rs
+    "sim-daemon/system/src/windows/storage.rs",         // as clock.rs
 ];

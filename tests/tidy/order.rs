@@ -216,6 +216,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-daemon/protocol/src",
         &[
+            "doors",
             "wire",
             "waiting",
             "memory",

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use sim_system::files::{free_bytes, shared_memory};
-use sim_system::{open_files, process};
+use crate::doors::system::files::{free_bytes, shared_memory};
+use crate::doors::system::{open_files, process};
 
 use crate::memory::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
 

@@ -29,6 +29,7 @@
 //! [`Client`] is one end, [`host::Host`] the other. This crate alone uses iceoryx2.
 
 mod client;
+mod doors;
 mod error;
 pub mod host;
 pub mod journal;

@@ -1,29 +1,20 @@
 //! A thread that starts before anything else: it hears signals, `tightloop stop` and the death of our parent in every state.
-//!
-//! A request to stop sets the flag that loops look at. A daemon that is not gone soon after, since one long piece of work
-//! keeps it, is ended here: its files go first.
+//! What it does then is in [`Watch`].
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use sim_protocol::daemon_lock::{DaemonLock, Remains};
-use sim_system::{process, signals};
+use sim_protocol::daemon_lock::DaemonLock;
+use sim_protocol::host::watch::{Places, Watch};
+use sim_system::signals;
 
 use crate::cli::Serve;
 use crate::error::DaemonError;
 use crate::printer::{self, Printer};
 
-/// Each look takes microseconds.
-const PERIOD: Duration = Duration::from_millis(25);
-/// An orderly end takes at most this long after the first request, else it is ended here.
-const GRACE: Duration = Duration::from_millis(1400);
-/// The same after the death of our parent, which nobody waits for, and after a second signal that comes at once.
-const GRACE_SHORT: Duration = Duration::from_millis(700);
-/// A signal this long after the first one ends at once: a terminal that closes sends several together.
-const AGAIN: Duration = Duration::from_millis(150);
 /// Longest wait for the last message.
 const LAST_WORDS: Duration = Duration::from_millis(100);
 
@@ -31,20 +22,10 @@ const LAST_WORDS: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 pub(crate) struct Watchdog {
     stop: Arc<AtomicBool>,
-    places: Arc<Mutex<Vec<Remains>>>,
+    places: Places,
     /// Nothing is sent: the thread sees that it is gone.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
-}
-
-/// What the thread watches.
-struct Watch {
-    stop: Arc<AtomicBool>,
-    /// A signal came; taken back here, so that the next one shows.
-    signalled: Arc<AtomicBool>,
-    parent: Option<u32>,
-    places: Arc<Mutex<Vec<Remains>>>,
-    stderr: Printer,
 }
 
 impl Watchdog {
@@ -58,20 +39,20 @@ impl Watchdog {
                 problem: error.to_string(),
             })?;
         }
-        let places = Arc::new(Mutex::new(Vec::new()));
+        let places = Places::default();
         let watch = Watch {
             stop: Arc::clone(&stop),
             signalled,
             parent: serve.parent,
-            places: Arc::clone(&places),
-            stderr: stderr.clone(),
+            places: places.clone(),
         };
         let (end, ended) = channel();
+        let (stderr, remains) = (stderr.clone(), places.clone());
         let priority = serve.priority;
         let work = move || {
             // threads that step at that priority would leave it no core; a client that asks for one gets an error if it is not granted
             let _ = priority.map(signals::set_priority);
-            watch.run(&ended);
+            watch.run(&ended, |reason| end_at_once(&stderr, &remains, reason));
         };
         let thread = std::thread::Builder::new()
             .name("tightloop-watchdog".to_owned())
@@ -95,8 +76,7 @@ impl Watchdog {
 
     /// From now on, this place is ours, and its files go with us. A request to stop the first one stops us.
     pub(crate) fn keep(&self, place: &DaemonLock) {
-        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.push(place.remains());
+        self.places.keep(place);
     }
 }
 
@@ -110,49 +90,11 @@ impl Drop for Watchdog {
     }
 }
 
-impl Watch {
-    fn run(&self, ended: &Receiver<()>) {
-        // when somebody first asked, and when the end is due
-        let mut asked: Option<(Instant, Instant)> = None;
-        while ended.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
-            let now = Instant::now();
-            let is_orphan = self.parent.is_some_and(process::is_orphan);
-            let is_signalled = self.signalled.swap(false, Ordering::Relaxed);
-            if is_orphan || is_signalled || self.is_asked_by_file() {
-                self.stop.store(true, Ordering::Relaxed);
-            }
-            if !self.stop.load(Ordering::Relaxed) {
-                continue;
-            }
-            let is_first = asked.is_none();
-            let (first, due) = asked.get_or_insert((now, now + GRACE));
-            if is_orphan || is_signalled && !is_first {
-                *due = (*due).min(now + GRACE_SHORT);
-            }
-            if is_signalled && now.duration_since(*first) >= AGAIN {
-                self.end("a second signal came");
-            }
-            if now >= *due {
-                self.end("it did not reach a place to stop in time");
-            }
-        }
-    }
-
-    fn is_asked_by_file(&self) -> bool {
-        let places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places
-            .first()
-            .is_some_and(|place| place.paths().is_asked_to_stop())
-    }
-
-    /// Ends the process, whatever its other threads do.
-    fn end(&self, reason: &str) -> ! {
-        self.stderr
-            .print(format!("tightloop: ended at once: {reason}\n"));
-        printer::flush_within(LAST_WORDS, [&self.stderr]);
-        // last: another daemon may take the name then
-        let places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.iter().rev().for_each(Remains::remove);
-        sim_engine::options::leave_at_once(1)
-    }
+/// Ends the process, whatever its other threads do.
+fn end_at_once(stderr: &Printer, places: &Places, reason: &str) -> ! {
+    stderr.print(format!("tightloop: ended at once: {reason}\n"));
+    printer::flush_within(LAST_WORDS, [stderr]);
+    // last: another daemon may take the name then
+    places.remove();
+    sim_engine::options::leave_at_once(1)
 }

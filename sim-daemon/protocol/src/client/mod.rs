@@ -3,8 +3,8 @@
 mod observer;
 mod on_device;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use observer::Observer;

@@ -1,8 +1,9 @@
 //! The observing end of a client: newest frames, nothing asked of the daemon.
 
+use crate::doors::sync::Arc;
+use crate::doors::time::Instant;
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::lease::controller::check_table;
 use crate::memory::frame::{Alive, FrameSample};

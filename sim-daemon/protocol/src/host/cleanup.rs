@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use iceoryx2::config::Config;
-use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
+use crate::doors::exists;
+use crate::doors::iceoryx2::config::Config;
+use crate::doors::iceoryx2::node::NodeView;
+use crate::doors::iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 
 use super::orphans::orphans;
 use super::worlds::S;
@@ -70,8 +71,8 @@ impl ClientCleanup {
         let nodes = self.folder().join("nodes");
         let dead_node = nodes.join(dead.to_string());
         // what fails here is tried again
-        let _ = std::fs::create_dir_all(&dead_node);
-        let _ = std::fs::copy(
+        let _ = crate::doors::fs::create_dir_all(&dead_node);
+        let _ = crate::doors::fs::copy(
             nodes.join(self.node.to_string()).join(&file),
             dead_node.join(&file),
         );
@@ -93,11 +94,12 @@ impl ClientCleanup {
         // what a folder holds comes after it
         again.sort_unstable();
         for path in again.into_iter().rev() {
-            let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+            let _ =
+                crate::doors::fs::remove_file(path).or_else(|_| crate::doors::fs::remove_dir(path));
         }
         let nodes = self.folder().join("nodes");
         self.completed
-            .retain(|node| nodes.join(node.to_string()).exists());
+            .retain(|node| exists(&nodes.join(node.to_string())));
         self.orphans = orphans;
     }
 }

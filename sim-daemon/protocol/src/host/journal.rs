@@ -1,10 +1,11 @@
 //! Journals: to each recorder what its daemon has carried out. Without one, this is a look at an empty list.
 
-use std::time::{Duration, Instant};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::identifiers::UniqueClientId;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{Node, PortFactory};
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
+use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
+use crate::doors::iceoryx2::prelude::{Node, PortFactory};
 
 use super::Inbox;
 use super::worlds::S;

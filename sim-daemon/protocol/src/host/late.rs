@@ -1,6 +1,6 @@
 //! Steps that the daemon makes itself: no command came and the worlds keep their pace, or a command asks for several.
 
-use std::time::Instant;
+use crate::doors::time::Instant;
 
 use super::inbox::Inbox;
 use super::journal::Occasion;

@@ -1,10 +1,11 @@
 //! The services of one lease, at the daemon.
 
-use std::sync::{Arc, Weak};
-use std::time::{Duration, Instant};
+use crate::doors::sync::{Arc, Weak};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{Node, PortFactory};
+use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
+use crate::doors::iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::S;
 use crate::memory::mapping::{self, Pages};

@@ -13,11 +13,14 @@ mod pace;
 mod state;
 #[cfg(test)]
 mod tests;
+pub mod watch;
 mod worlds;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use crate::doors;
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::{AtomicBool, Ordering};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
 pub use cleanup::ClientCleanup;
 pub use inbox::{Inbox, Numbers};
@@ -78,12 +81,12 @@ impl Host {
         stops: &[&str],
         stop: Arc<AtomicBool>,
     ) -> Result<Host, ProtocolError> {
-        let session = random();
+        let session = doors::random();
         description.protocol = crate::PROTOCOL_VERSION;
         description.release = env!("CARGO_PKG_VERSION").to_owned();
         description.name = daemon_lock.paths().name().to_owned();
         description.session = session;
-        description.pid = std::process::id();
+        description.pid = crate::doors::process::id();
         description.schema = description.schema_hash();
         check(&description, &frame, 0, 1)?;
 
@@ -239,7 +242,7 @@ impl Host {
             if !self.is_waited_for() {
                 return false;
             }
-            std::thread::sleep((wait - AROUND_PERIOD / 2).min(AROUND_PERIOD));
+            crate::doors::thread::sleep((wait - AROUND_PERIOD / 2).min(AROUND_PERIOD));
         }
         true
     }
@@ -409,10 +412,4 @@ fn check(
 /// Memory that can still be taken, of the machine or of our control group, whichever has less [bytes].
 pub fn free_memory() -> u64 {
     budget::free().memory
-}
-
-/// Random number of a run: two runs must not be taken for each other, nothing more.
-fn random() -> u64 {
-    use std::hash::{BuildHasher, Hasher, RandomState};
-    RandomState::new().build_hasher().finish()
 }

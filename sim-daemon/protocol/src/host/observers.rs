@@ -1,9 +1,10 @@
 //! Observers: at a limited rate they get the first worlds of a frame, with the state from which these could go on.
 
-use std::time::{Duration, Instant};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{Node, PortFactory};
+use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
+use crate::doors::iceoryx2::prelude::{Node, PortFactory};
 
 use super::worlds::{S, Worlds};
 use crate::memory::guard::guarded;

@@ -1,12 +1,12 @@
 //! Files in a daemon's folder that no node owns any more.
 
+use crate::doors::fs::{metadata, read_dir};
 use std::collections::HashSet;
-use std::fs::{metadata, read_dir};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use sim_system::files::is_write_only;
-use sim_system::process;
+use crate::doors::system::files::is_write_only;
+use crate::doors::system::process;
 
 /// Kinds of files that belong to ports.
 const OF_PORTS: [&str; 4] = ["connection", "data", "event", "event_mgmt"];

@@ -1,6 +1,6 @@
 //! When frames are due, and how well they kept to it.
 
-use std::time::Instant;
+use crate::doors::time::Instant;
 
 use hdrhistogram::Histogram;
 

@@ -1,11 +1,12 @@
 //! What a host looks after: leases, control requests, observers, and the answers to commands.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::{AtomicBool, Ordering};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::identifiers::UniqueClientId;
-use iceoryx2::prelude::Node;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
+use crate::doors::iceoryx2::prelude::Node;
 
 use super::Inbox;
 use super::handover::Handover;

@@ -2,12 +2,13 @@
 
 pub mod digest;
 
+use crate::doors::sync::Arc;
+use crate::doors::time::Instant;
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use iceoryx2::sample::Sample;
-use sim_system::files::shared_memory;
+use crate::doors::iceoryx2::sample::Sample;
+use crate::doors::system::files::shared_memory;
 
 use crate::memory::guard::guarded;
 use crate::memory::loaned;
@@ -176,7 +177,7 @@ impl Journal {
             if start.elapsed() >= timeout {
                 return Ok(None);
             }
-            std::thread::sleep(NAP.min(timeout));
+            crate::doors::thread::sleep(NAP.min(timeout));
         }
     }
 

@@ -1,13 +1,14 @@
 //! The controlling end of a client: one lease, one command in flight.
 
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::Ordering;
+use crate::doors::time::Instant;
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use iceoryx2::prelude::PortFactory;
-use sim_system::files::shared_memory;
-use sim_system::process;
+use crate::doors::iceoryx2::prelude::PortFactory;
+use crate::doors::system::files::shared_memory;
+use crate::doors::system::process;
 
 use crate::lease::device_memory::{self, Delivery};
 use crate::lease::heartbeat::HeartbeatThread;
@@ -89,7 +90,7 @@ impl Controller {
     ) -> Result<Controller, ProtocolError> {
         let start = Instant::now();
         // what an earlier call did not wait for may be granted yet, to nobody
-        let (own_pid, abandoned) = (std::process::id(), &connection.abandoned);
+        let (own_pid, abandoned) = (crate::doors::process::id(), &connection.abandoned);
         let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
         loop {
             let error = match ask_for_lease(connection, hook) {
@@ -303,7 +304,7 @@ impl Controller {
 
 /// Asks for the lease once.
 fn ask_for_lease(connection: &Connection, hook: Hook<'_>) -> Result<u64, ProtocolError> {
-    let pid = std::process::id();
+    let pid = crate::doors::process::id();
     match connection.ask(&Request::Acquire { pid }, hook)? {
         Response::Granted { epoch } => Ok(epoch),
         Response::Held { pid } => Err(ProtocolError::LeaseHeld {

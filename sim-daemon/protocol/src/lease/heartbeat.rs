@@ -1,7 +1,7 @@
 //! Heartbeats of a controller: they confirm its lease.
 
-use std::sync::{Arc, Condvar, Mutex};
-use std::thread::JoinHandle;
+use crate::doors::sync::{Arc, Condvar, Mutex};
+use crate::doors::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::presence::connection::Connection;
@@ -34,7 +34,7 @@ impl HeartbeatThread {
             }
         };
         // without a thread the lease can be taken over while nobody steps, which is a lesser evil than no lease
-        let thread = std::thread::Builder::new()
+        let thread = crate::doors::thread::Builder::new()
             .name("tightloop-heart".to_owned())
             .spawn(beat)
             .ok();

@@ -1,6 +1,7 @@
 //! Which process this is, without a system call: what a fork copies is not the child's.
 
-use sim_system::forks;
+use crate::doors::process;
+use crate::doors::system::forks;
 
 /// The process in which something was made.
 #[derive(Debug, Clone, Copy)]
@@ -15,7 +16,7 @@ impl Maker {
     pub fn this() -> Maker {
         forks::start_to_count();
         Maker {
-            pid: std::process::id(),
+            pid: process::id(),
             forks: forks::count_so_far(),
         }
     }

@@ -1,10 +1,10 @@
 //! A frame: one sample from the daemon, owned, with its checked field table.
 
+use crate::doors::sync::atomic::{AtomicUsize, Ordering};
+use crate::doors::sync::{Arc, Mutex};
 use std::fmt;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 
-use iceoryx2::sample::Sample;
+use crate::doors::iceoryx2::sample::Sample;
 
 use crate::memory::forked::Maker;
 use crate::memory::port::Port;

@@ -3,11 +3,11 @@
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::{LoanError, SendError};
-use iceoryx2::prelude::{Service, ZeroCopySend};
-use iceoryx2::sample::Sample;
-use iceoryx2::sample_mut_uninit::SampleMutUninit;
+use crate::doors::iceoryx2::port::publisher::Publisher;
+use crate::doors::iceoryx2::port::{LoanError, SendError};
+use crate::doors::iceoryx2::prelude::{Service, ZeroCopySend};
+use crate::doors::iceoryx2::sample::Sample;
+use crate::doors::iceoryx2::sample_mut_uninit::SampleMutUninit;
 
 use crate::Line;
 use crate::memory::guard::guarded;

@@ -4,7 +4,7 @@
 use std::mem::ManuallyDrop;
 use std::ops::{Deref, DerefMut};
 
-use iceoryx2::config::Config;
+use crate::doors::iceoryx2::config::Config;
 
 use crate::memory::guard::guarded;
 use crate::memory::mapping;

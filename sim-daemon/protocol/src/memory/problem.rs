@@ -4,8 +4,8 @@ use std::cell::RefCell;
 use std::io;
 use std::path::Path;
 
-use sim_system::files::{SHARED_MEMORY_CURE, free_bytes, is_writable, shared_memory};
-use sim_system::open_files;
+use crate::doors::system::files::{SHARED_MEMORY_CURE, free_bytes, is_writable, shared_memory};
+use crate::doors::system::open_files;
 
 /// With less than this left, what the transport writes beside its memory does not fit either [bytes].
 pub(crate) const FREE_MIN: u64 = 64 << 10;

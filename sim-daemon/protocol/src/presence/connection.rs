@@ -1,11 +1,12 @@
 //! How each part of a client reaches the daemon: node, control requests, wake-up.
 
-use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::{Duration, Instant};
+use crate::doors::sync::Mutex;
+use crate::doors::sync::atomic::AtomicBool;
+use crate::doors::sync::mpsc::{self, RecvTimeoutError};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::prelude::Node;
+use crate::doors::iceoryx2::prelude::Node;
 
 use crate::memory::guard::guarded;
 use crate::memory::mapping;
@@ -68,7 +69,7 @@ impl Connection {
             // nobody waits any more for one that comes too late
             let _ = sender.send(Connection::open_here(thread_peer));
         };
-        std::thread::Builder::new()
+        crate::doors::thread::Builder::new()
             .name("tightloop-attach".to_owned())
             .spawn(open)
             .map_err(|error| ProtocolError::transport("start a thread", error))?;
@@ -95,7 +96,7 @@ impl Connection {
             match transport::open_wake(&node, peer.paths.name()) {
                 // the daemon is about to clean up after clients that were killed a moment ago
                 Err(ProtocolError::TooManyClients { .. }) if start.elapsed() < OPEN_MAX => {
-                    std::thread::sleep(PAUSE);
+                    crate::doors::thread::sleep(PAUSE);
                 }
                 opened => break opened?,
             }
@@ -181,7 +182,7 @@ impl Connection {
                 }
                 polled = Instant::now();
             }
-            std::thread::sleep(nap);
+            crate::doors::thread::sleep(nap);
             nap = (nap * 3 / 2).min(Duration::from_millis(1));
         }
     }
@@ -209,7 +210,7 @@ impl Connection {
             if hook().is_break() {
                 return Err(ProtocolError::Interrupted);
             }
-            std::thread::sleep(Duration::from_millis(1));
+            crate::doors::thread::sleep(Duration::from_millis(1));
         }
         drop(ends);
         Ok(())
@@ -278,7 +279,7 @@ pub(crate) fn pause(hook: Hook<'_>) -> Result<(), ProtocolError> {
     if hook().is_break() {
         return Err(ProtocolError::Interrupted);
     }
-    std::thread::sleep(PAUSE);
+    crate::doors::thread::sleep(PAUSE);
     Ok(())
 }
 

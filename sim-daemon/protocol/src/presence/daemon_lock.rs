@@ -1,12 +1,14 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
-use std::fs::{self, File};
+use crate::doors::exists;
+use crate::doors::fs::{self, File};
+use crate::doors::sync::{Arc, Mutex, PoisonError};
+use crate::doors::time::Instant;
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use sim_system::files::{self, private, shared_memory};
+use crate::doors::system::files::{self, private, shared_memory};
 
 use crate::presence::paths::{
     DaemonPaths, Presence, STARTING, default_root, names_with_lock, private_folder,
@@ -71,7 +73,7 @@ impl DaemonLock {
                 }
                 _ if start.elapsed() > LOOK_MAX => None,
                 _ => {
-                    std::thread::sleep(Duration::from_millis(2));
+                    crate::doors::thread::sleep(Duration::from_millis(2));
                     continue;
                 }
             };
@@ -121,7 +123,7 @@ impl DaemonLock {
     /// # Errors
     /// [`ProtocolError::Root`] when the lock file cannot be written.
     pub fn announce(&mut self, session: u64, groups: usize) -> Result<(), ProtocolError> {
-        let pid = std::process::id();
+        let pid = crate::doors::process::id();
         let groups = match groups {
             1 => String::new(),
             _ => format!(" {groups}"),
@@ -176,7 +178,7 @@ impl Remains {
         // other threads of ours may be making files
         for _ in 0..REMOVALS {
             remove_shared_files(&self.paths, None);
-            if !self.paths.shared_folder().exists() {
+            if !exists(&self.paths.shared_folder()) {
                 break;
             }
         }
@@ -265,7 +267,7 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
         if runs || start.elapsed() > LOOK_MAX {
             return Ok(false);
         }
-        std::thread::yield_now();
+        crate::doors::thread::yield_now();
     }
 }
 
@@ -314,7 +316,7 @@ fn sweep_folder(folder: &Path) {
         return;
     }
     drop(mark);
-    let had_root = root.exists();
+    let had_root = exists(&root);
     let Ok(paths) = DaemonPaths::new(Some(&root), name) else {
         return;
     };

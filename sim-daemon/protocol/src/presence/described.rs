@@ -4,7 +4,8 @@
 use std::io::{Read, Write};
 use std::path::PathBuf;
 
-use sim_system::files::private;
+use crate::doors::exists;
+use crate::doors::system::files::private;
 
 use crate::presence::paths::DaemonPaths;
 use crate::{Description, ProtocolError};
@@ -74,5 +75,5 @@ pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64, damage: Damage) {
 
 /// Whether the daemon has found a damage. A few microseconds.
 pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64, damage: Damage) -> bool {
-    mark(paths, session, damage).exists()
+    exists(&mark(paths, session, damage))
 }

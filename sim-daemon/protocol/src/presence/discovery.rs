@@ -1,7 +1,8 @@
 //! Looking for a daemon by its name.
 
+use crate::doors::time::Instant;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::presence::paths::{Beacon, DaemonPaths, Presence, running};
 use crate::waiting::hook::Hook;
@@ -73,7 +74,7 @@ pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beaco
         if hook().is_break() {
             return Err(ProtocolError::Interrupted);
         }
-        std::thread::sleep(Duration::from_millis(2));
+        crate::doors::thread::sleep(Duration::from_millis(2));
     };
     if beacon.protocol != PROTOCOL_VERSION {
         let (daemon, client) = (beacon.protocol, PROTOCOL_VERSION);

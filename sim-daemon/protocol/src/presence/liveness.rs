@@ -1,7 +1,7 @@
 //! Is the daemon that we attached to still there?
 
-use std::fs::File;
-use std::sync::Arc;
+use crate::doors::fs::File;
+use crate::doors::sync::Arc;
 use std::time::Duration;
 
 use crate::ProtocolError;

@@ -11,18 +11,18 @@
 //! A process that can take the lock may remove the rest. SHARED is `/dev/shm` on Linux, `/private/var/tmp` on macOS and the user's
 //! temporary folder on Windows, whatever ROOT is, since the path of a Unix socket is limited to 107 bytes.
 
-use std::fs::{self, File, Metadata};
+use crate::doors::fs::{self, File, Metadata};
+use crate::doors::sync::OnceLock;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
-use iceoryx2::config::Config;
-use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
-use sim_system::files::{self, exposed, make_private_folder, own_folder_name, private};
+use crate::doors::iceoryx2::config::Config;
+use crate::doors::iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
+use crate::doors::system::files::{self, exposed, make_private_folder, own_folder_name, private};
 
 use crate::ProtocolError;
+pub use crate::doors::system::files::shared_memory;
 use crate::wire::hash::Fnv;
-pub use sim_system::files::shared_memory;
 
 /// The variable that names the folder of a login session.
 pub const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
@@ -240,7 +240,7 @@ impl DaemonPaths {
     pub(crate) fn takes_files(&self) -> bool {
         let path = self
             .root
-            .join(format!("{}.{}", self.name, std::process::id()));
+            .join(format!("{}.{}", self.name, crate::doors::process::id()));
         let is_made = private().create(true).truncate(false).open(&path).is_ok();
         let _ = fs::remove_file(&path);
         is_made

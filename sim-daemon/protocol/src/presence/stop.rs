@@ -1,6 +1,7 @@
 //! Stopping a daemon that may be too busy to answer: by a file that its watchdog sees.
 
-use std::time::{Duration, Instant};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
 use crate::ProtocolError;
 use crate::presence::daemon_lock::remove_own_root;
@@ -17,7 +18,7 @@ pub(crate) struct Asked<'a>(&'a DaemonPaths);
 impl Drop for Asked<'_> {
     fn drop(&mut self) {
         if matches!(self.0.presence(), Ok(Presence::Absent)) {
-            let _ = std::fs::remove_file(self.0.stop_path());
+            let _ = crate::doors::fs::remove_file(self.0.stop_path());
             remove_own_root(self.0.root());
         }
     }
@@ -55,7 +56,7 @@ pub fn stop(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<(), P
         if hook().is_break() {
             return Err(ProtocolError::Interrupted);
         }
-        std::thread::sleep(Duration::from_millis(2));
+        crate::doors::thread::sleep(Duration::from_millis(2));
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Node, NodeState, Service};
+use crate::doors::iceoryx2::node::NodeView;
+use crate::doors::iceoryx2::prelude::{CallbackProgression, Node, NodeState, Service};
 
 /// Processes that a message lists.
 const LISTED_MAX: usize = 8;

@@ -1,10 +1,10 @@
 //! Shared memory of a daemon: how much it will take, whether that is there, and taking it for certain.
 
-use std::fs::{self, OpenOptions};
+use crate::doors::fs::{self, OpenOptions};
 use std::io::ErrorKind;
 use std::path::Path;
 
-use sim_system::files::{free_bytes, shared_memory};
+use crate::doors::system::files::{free_bytes, shared_memory};
 
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
 use crate::wire::command::command_bytes;
@@ -98,7 +98,7 @@ pub(crate) fn check(
 pub(crate) fn free() -> Free {
     Free {
         shared: free_bytes(Path::new(shared_memory())),
-        memory: sim_system::memory::available(),
+        memory: crate::doors::system::memory::available(),
     }
 }
 
@@ -119,7 +119,7 @@ pub(crate) fn reserve(folder: &Path, port: u128, what: &str) -> Result<(), Proto
         .open(&path)
         .map_err(|error| failed(&error))?;
     let needed = file.metadata().map_err(|error| failed(&error))?.len();
-    sim_system::storage::reserve(&file, needed).map_err(|error| match error.kind() {
+    crate::doors::system::storage::reserve(&file, needed).map_err(|error| match error.kind() {
         ErrorKind::StorageFull => full(needed, what),
         _ => failed(&error),
     })

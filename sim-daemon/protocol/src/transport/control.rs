@@ -1,11 +1,11 @@
 //! The service `control`: requests of clients, and the daemon's responses.
 
-use iceoryx2::active_request::ActiveRequest;
-use iceoryx2::identifiers::UniqueClientId;
-use iceoryx2::port::client::Client as ControlClient;
-use iceoryx2::port::server::Server;
-use iceoryx2::prelude::*;
-use iceoryx2::service::port_factory::request_response;
+use crate::doors::iceoryx2::active_request::ActiveRequest;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
+use crate::doors::iceoryx2::port::client::Client as ControlClient;
+use crate::doors::iceoryx2::port::server::Server;
+use crate::doors::iceoryx2::prelude::*;
+use crate::doors::iceoryx2::service::port_factory::request_response;
 
 use super::{CLIENTS_MAX, service_name};
 use crate::ProtocolError;

@@ -4,18 +4,19 @@ mod attached;
 pub(crate) mod budget;
 mod control;
 
+use crate::doors::sync::Once;
 use std::fmt::Debug;
 use std::path::Path;
-use std::sync::Once;
 
-use iceoryx2::config::Config;
-use iceoryx2::port::listener::Listener;
-use iceoryx2::port::notifier::Notifier;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
-use iceoryx2::prelude::*;
-use iceoryx2::service::builder::event::EventOpenError;
-use iceoryx2::service::port_factory::{event, publish_subscribe};
+use crate::doors::fs;
+use crate::doors::iceoryx2::config::Config;
+use crate::doors::iceoryx2::port::listener::Listener;
+use crate::doors::iceoryx2::port::notifier::Notifier;
+use crate::doors::iceoryx2::port::publisher::Publisher;
+use crate::doors::iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use crate::doors::iceoryx2::prelude::*;
+use crate::doors::iceoryx2::service::builder::event::EventOpenError;
+use crate::doors::iceoryx2::service::port_factory::{event, publish_subscribe};
 
 use attached::holders;
 pub(crate) use control::{
@@ -96,10 +97,10 @@ pub(crate) fn node<S: Service>(
 
 /// Takes from others what the transport's own folders of nodes leave them; the folder around them lets nobody in anyway.
 fn close_folders(config: &Config) {
-    let nodes = Path::new(config.global.node_dir().as_str()).read_dir();
+    let nodes = fs::read_dir(Path::new(config.global.node_dir().as_str()));
     for node in nodes.into_iter().flatten().flatten() {
         // a node that ends meanwhile takes its folder with it
-        sim_system::files::close_to_others(&node.path());
+        crate::doors::system::files::close_to_others(&node.path());
     }
 }
 

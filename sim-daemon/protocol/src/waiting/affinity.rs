@@ -4,9 +4,10 @@
 //! and leaves them there. Each side therefore says where it runs; when that is the same core, nobody spins, and the daemon
 //! moves away once in a while.
 
-use std::time::{Duration, Instant};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use sim_system::cores;
+use crate::doors::system::cores;
 
 /// Asking where we run is a system call: once in so many commands is enough.
 const ASK_PERIOD: u32 = 16;
@@ -66,7 +67,9 @@ impl CoreAffinity {
 
 fn core_or_unknown() -> u64 {
     // two sides whose cores are unknown are not on one core
-    cores::current().map_or(UNKNOWN | u64::from(std::process::id()), |core| core as u64)
+    cores::current().map_or(UNKNOWN | u64::from(crate::doors::process::id()), |core| {
+        core as u64
+    })
 }
 
 #[cfg(test)]

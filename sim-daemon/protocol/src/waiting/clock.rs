@@ -1,6 +1,6 @@
 //! The monotonic clock, in nanoseconds, and waiting for a time on it.
 
-pub(crate) use sim_system::clock::now;
+pub(crate) use crate::doors::system::clock::now;
 
 /// Waking takes tens of microseconds, on some machines hundreds: a thread sleeps so much less, and spins for the rest [ns].
 const MARGIN_MIN: u64 = 100_000;
@@ -25,7 +25,7 @@ impl Alarm {
         if until <= now() {
             return;
         }
-        sim_system::clock::sleep_until(until);
+        crate::doors::system::clock::sleep_until(until);
         let needed = 2 * now().saturating_sub(until);
         let kept = self.margin - self.margin / FORGET;
         self.margin = needed.max(kept).clamp(MARGIN_MIN, MARGIN_MAX);
@@ -35,7 +35,7 @@ impl Alarm {
     pub(crate) fn wait_until(&mut self, at: u64) {
         self.sleep_until_shortly_before(at);
         while now() < at {
-            std::hint::spin_loop();
+            crate::doors::thread::spin_loop();
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use iceoryx2::port::listener::{Listener, ListenerWaitError};
-use iceoryx2::prelude::Service;
-use iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
-use sim_system::files::wait_readable;
+use crate::doors::iceoryx2::port::listener::{Listener, ListenerWaitError};
+use crate::doors::iceoryx2::prelude::Service;
+use crate::doors::iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
+use crate::doors::system::files::wait_readable;
 
 use crate::ProtocolError;
 

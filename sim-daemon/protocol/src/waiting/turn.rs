@@ -1,16 +1,12 @@
 //! Taking turns on a value: a call has it for itself, but no lock, while it waits and the caller's own code may run.
 
+use crate::doors::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use crate::doors::thread::{self, ThreadId};
 use std::ops::{Deref, DerefMut};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::ThreadId;
 
 use crate::ProtocolError;
 use crate::waiting::SLICE;
 use crate::waiting::hook::Hook;
-
-thread_local! {
-    static THIS_THREAD: ThreadId = std::thread::current().id();
-}
 
 /// Nothing of ours is left half-written when a thread panics: a poisoned lock is as good as any.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -61,7 +57,7 @@ impl<T> Turn<T> {
     /// # Errors
     /// [`ProtocolError::CallInProgress`] when this thread has it already; [`ProtocolError::Interrupted`].
     pub(crate) fn take(&self, hook: Hook<'_>) -> Result<Held<'_, T>, ProtocolError> {
-        let me = THIS_THREAD.with(|thread| *thread);
+        let me = thread::this();
         let mut state = lock(&self.state);
         if state.holder == Some(me) {
             return Err(ProtocolError::CallInProgress);

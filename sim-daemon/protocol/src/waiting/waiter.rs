@@ -1,10 +1,11 @@
 //! How to wait: spin while the answer is likely to come soon and a core is free for it, else sleep.
 
-use std::time::{Duration, Instant};
+use crate::doors::time::Instant;
+use std::time::Duration;
 
-use iceoryx2::port::listener::Listener;
-use iceoryx2::prelude::Service;
-use iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
+use crate::doors::iceoryx2::port::listener::Listener;
+use crate::doors::iceoryx2::prelude::Service;
+use crate::doors::iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
 
 use crate::ProtocolError;
 use crate::waiting::SLICE;
@@ -113,7 +114,7 @@ impl Waiter {
                     if let Some(value) = awaited.poll()? {
                         return Ok(value);
                     }
-                    std::hint::spin_loop();
+                    crate::doors::thread::spin_loop();
                     continue;
                 }
             }
@@ -213,7 +214,7 @@ fn spin_until<T>(end: Instant, awaited: &mut impl Awaited<T>) -> Result<Option<T
             if let Some(value) = awaited.poll()? {
                 return Ok(Some(value));
             }
-            std::hint::spin_loop();
+            crate::doors::thread::spin_loop();
         }
         if Instant::now() > end {
             return Ok(None);
@@ -223,5 +224,5 @@ fn spin_until<T>(end: Instant, awaited: &mut impl Awaited<T>) -> Result<Option<T
 
 /// Cores that this process may use.
 pub(crate) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    crate::doors::thread::available_parallelism().map_or(1, usize::from)
 }

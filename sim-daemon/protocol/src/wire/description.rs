@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Dtype;
 
 /// A running daemon in full: everything that does not change while it runs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Description {
     /// Protocol version of the daemon.
     pub protocol: u32,

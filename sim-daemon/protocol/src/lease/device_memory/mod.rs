@@ -7,15 +7,15 @@
 //! ```
 //! The daemon waits for no client. It closes a connection that has not named a lease when the request comes.
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(any(simulated, not(target_os = "linux")))]
 mod absent;
-#[cfg(target_os = "linux")]
+#[cfg(all(not(simulated), target_os = "linux"))]
 mod sockets;
 
-#[cfg(not(target_os = "linux"))]
+#[cfg(any(simulated, not(target_os = "linux")))]
 pub(crate) use absent::{Door, Visitor, deliver, receive, visit};
 use serde::{Deserialize, Serialize};
-#[cfg(target_os = "linux")]
+#[cfg(all(not(simulated), target_os = "linux"))]
 pub(crate) use sockets::{Door, Visitor, deliver, receive, visit};
 
 /// A descriptor of the driver, which the importing process takes over.

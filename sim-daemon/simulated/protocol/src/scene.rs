@@ -1,0 +1,252 @@
+//! One run: processes begin, live and die by a plan, and at the end everything is as if nobody had been there.
+
+use std::path::Path;
+use std::time::Duration;
+
+use sim_machine::fs;
+use sim_machine::process::{self, Handle};
+use sim_machine::system::signals;
+use sim_machine::thread::sleep;
+use sim_machine::time::{jump, now};
+use sim_machine::{Outcome, Run, note};
+use sim_protocol_simulated::{AttachOptions, ProtocolError, keep_waiting, stop, sweep};
+
+use crate::client::Actor;
+use crate::daemon::{self, NAME, ROOT};
+use crate::facts::{Facts, kinds_of_files};
+use crate::plan::{Act, Fate, Plan, Whom};
+
+/// A daemon whose owner died is gone after this time [ns].
+const ORPHAN_MAX: u64 = 2_000_000_000;
+/// Everybody has done what they do by then [ms].
+const END_MAX: u64 = 400_000;
+/// Doors of a run that ends.
+const STEPS_MAX: u64 = 30_000_000;
+/// A folder without a mark is old then.
+const OLD: Duration = Duration::from_secs(61);
+/// All jumps of the calendar together are shorter [s].
+const JUMPS_MAX: i64 = 1_000_000;
+/// By then a daemon has cleaned up after everybody: it looks for files without an owner twice, half a second apart.
+const CLEAN: Duration = Duration::from_secs(3);
+/// Bytes of shared memory.
+const SHARED: u64 = 1 << 30;
+
+/// Carries out a plan.
+pub fn run(plan: &Plan, trace: bool) -> (Outcome, u64) {
+    let facts = Facts::default();
+    let (seen, carried) = (facts.clone(), plan.clone());
+    let run = Run {
+        seed: plan.seed,
+        failing: plan.failing,
+        dropping: plan.dropping,
+        lateness: 1000 * plan.lateness,
+        steps_max: STEPS_MAX,
+        trace,
+    };
+    let outcome = run.of(move || play(&carried, &facts));
+    let commands = seen.commands();
+    (outcome, commands)
+}
+
+/// The processes of clients, by their number in the plan.
+struct Cast<'a> {
+    plan: &'a Plan,
+    facts: &'a Facts,
+    clients: Vec<Handle>,
+    /// Owners that were killed, their daemon, and when that must be gone at the latest.
+    orphans: Vec<(Handle, u64)>,
+}
+
+fn play(plan: &Plan, facts: &Facts) {
+    fs::set_capacity(SHARED);
+    let clients = Vec::new();
+    let orphans = Vec::new();
+    let mut cast = Cast {
+        plan,
+        facts,
+        clients,
+        orphans,
+    };
+    cast.launch();
+    for number in 0..plan.clients.len() {
+        let client = cast.begin(number);
+        cast.clients.push(client);
+    }
+    for (after, fate) in &plan.fates {
+        sleep(Duration::from_millis(*after));
+        note(|| format!("{fate:?}"));
+        cast.befall(*fate);
+        cast.look_after_orphans();
+    }
+    cast.end();
+}
+
+impl Cast<'_> {
+    /// Launches a daemon, from an owner of its own.
+    fn launch(&self) {
+        let (facts, failing) = (self.facts.clone(), self.plan.failing > 0);
+        let owner = process::start(move || {
+            let (owner, own) = (Handle::this(), facts.clone());
+            let daemon = process::start(move || {
+                let began = now();
+                let served = daemon::run(&own, owner.pid);
+                let may_fail = failing || own.was_squeezed(began);
+                match served {
+                    Ok(()) | Err(ProtocolError::NameTaken { .. }) => {}
+                    Err(error) => assert!(may_fail, "the daemon ends: {error}"),
+                }
+            });
+            facts.launched(owner, daemon);
+            while daemon.is_alive() {
+                sleep(Duration::from_millis(100));
+            }
+        });
+        note(|| format!("owner {}", owner.pid));
+    }
+
+    fn begin(&self, number: usize) -> Handle {
+        let (facts, failing) = (self.facts.clone(), self.plan.failing > 0);
+        let acts: Vec<Act> = self.plan.clients[number].clone();
+        process::start(move || Actor::new(&facts, failing).play(&acts))
+    }
+
+    fn who(&self, whom: Whom) -> Option<Handle> {
+        match whom {
+            Whom::Client(number) => self.clients.get(number).copied(),
+            Whom::Daemon => self.facts.daemon(),
+            Whom::Owner => self.facts.owner(),
+        }
+    }
+
+    fn befall(&mut self, fate: Fate) {
+        match fate {
+            Fate::Kill(whom) => {
+                let Some(who) = self.who(whom) else { return };
+                let owned = (whom == Whom::Owner && who.is_alive())
+                    .then(|| self.facts.daemon())
+                    .flatten();
+                who.kill();
+                self.orphans.extend(owned.map(|daemon| (daemon, now())));
+            }
+            Fate::Stop(whom, time) => {
+                let Some(who) = self.who(whom) else { return };
+                who.stop();
+                self.facts.stop(1_000_000 * time);
+                let again = Duration::from_millis(time);
+                sim_machine::at(again, move || who.resume());
+            }
+            Fate::Again(number) => {
+                if let Some(before) = self.clients.get(number).filter(|client| !client.is_alive()) {
+                    note(|| format!("in place of {before:?}"));
+                    self.clients[number] = self.begin(number);
+                }
+            }
+            Fate::Launch => self.launch(),
+            Fate::Signal => {
+                let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
+                daemon
+                    .into_iter()
+                    .for_each(|daemon| signals::send(daemon.pid));
+            }
+            Fate::Jump(seconds) => jump(1_000_000_000 * seconds),
+            Fate::Squeeze(kibibytes, time) => {
+                // calls that began before it ends may fail
+                self.facts.squeeze(now() + 1_000_000 * time);
+                fs::set_free(kibibytes << 10);
+                sim_machine::at(Duration::from_millis(time), || fs::set_capacity(SHARED));
+            }
+        }
+    }
+
+    /// A daemon whose owner is dead goes, unless it is stopped.
+    fn look_after_orphans(&mut self) {
+        let facts = self.facts;
+        self.orphans.retain(|&(daemon, since)| {
+            let waited = now() - since;
+            let late = waited.saturating_sub(facts.stopped_since(since)) > ORPHAN_MAX + 200_000_000;
+            assert!(!late || !daemon.is_alive(), "{daemon:?} outlives its owner");
+            daemon.is_alive() && !late
+        });
+    }
+
+    /// Waits for everybody, ends the daemon, and looks for what is left.
+    fn end(&mut self) {
+        let mut waited = 0;
+        let alive = |clients: &[Handle]| clients.iter().any(|client| client.is_alive());
+        while alive(&self.clients) {
+            sleep(Duration::from_millis(100));
+            waited += 100;
+            self.look_after_orphans();
+            // a call whose memory cannot be made takes minutes
+            let most = if self.plan.failing > 0 {
+                20 * END_MAX
+            } else {
+                END_MAX
+            };
+            assert!(waited < most, "a client never ends");
+        }
+        sim_machine::calm();
+        // by then nobody is stopped and shared memory has room
+        sleep(Duration::from_secs(7));
+        let overwritten = sim_machine::iceoryx2::overwritten();
+        assert_eq!(
+            overwritten, 0,
+            "frames were overwritten that somebody holds"
+        );
+        self.last_client();
+        self.in_a_process(|| {
+            let options = AttachOptions {
+                root: Some(ROOT.into()),
+                wait: Duration::ZERO,
+            };
+            match stop(NAME, &options, &mut keep_waiting()) {
+                Ok(()) | Err(ProtocolError::NoDaemon { .. }) => {}
+                Err(error) => panic!("the daemon cannot be stopped: {error}"),
+            }
+            sweep(Some(Path::new(ROOT))).expect("nothing is in the way");
+        });
+        if self.plan.failing > 0 || !self.plan.fates.is_empty() {
+            // a folder whose daemon was killed before it was marked goes when it is old, by a calendar that was not set back
+            jump(1_000_000_000 * JUMPS_MAX);
+            sleep(OLD);
+            self.in_a_process(|| sweep(Some(Path::new(ROOT))).expect("nothing is in the way"));
+        }
+        let left = fs::list(Path::new("/dev/shm"));
+        assert!(left.is_empty(), "left behind: {left:?}");
+        let left = fs::list(Path::new(ROOT));
+        assert!(left.is_empty(), "left behind: {left:?}");
+    }
+
+    /// A daemon that lives serves whoever comes, and keeps nothing of those who went.
+    fn last_client(&self) {
+        let lives = || {
+            let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
+            daemon.filter(|_| self.plan.failing == 0)
+        };
+        let (before, commands) = (lives(), self.facts.commands());
+        let facts = self.facts.clone();
+        self.in_a_process(move || {
+            Actor::new(&facts, false).play(&[Act::Attach(5000), Act::Steps(3), Act::Observe(1)]);
+        });
+        sleep(CLEAN);
+        if before.is_some() && before == lives() {
+            assert_eq!(
+                self.facts.commands(),
+                commands + 3,
+                "nobody can be in control any more"
+            );
+            let (first, last) = (self.facts.first_files(), kinds_of_files());
+            assert_eq!(last, first, "the daemon keeps what others left");
+        }
+    }
+
+    fn in_a_process(&self, call: impl FnOnce() + Send + 'static) {
+        let process = process::start(call);
+        let mut waited = 0;
+        while process.is_alive() {
+            sleep(Duration::from_millis(10));
+            waited += 10;
+            assert!(waited < END_MAX, "it never ends");
+        }
+    }
+}
