@@ -24,7 +24,7 @@ pub(crate) struct Observer {
     description: Arc<Description>,
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
-    subscriber: FrameSubscriber<S>,
+    subscriber: Arc<FrameSubscriber<S>>,
     listener: Sleeper<S>,
 }
 
@@ -46,7 +46,7 @@ impl Observer {
             description: Arc::clone(description),
             table: None,
             frames: Alive::new(),
-            subscriber,
+            subscriber: Arc::new(subscriber),
             listener,
         })
     }
@@ -69,7 +69,8 @@ impl Observer {
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
         let base = payload.as_ptr() as usize;
-        let frame = Frame::new((header, base), sample, table, &self.frames);
+        let reader = Arc::clone(&self.subscriber);
+        let frame = Frame::new((header, base), sample, table, &self.frames, reader);
         Ok(Some(frame))
     }
 

@@ -309,6 +309,23 @@ fn observers_see_fewer_frames_where_it_takes_long_to_show_one() {
 }
 
 #[test]
+fn a_frame_that_an_observer_got_stays_as_it_was_without_its_client() {
+    let fake = Fake::start("kept");
+    let hook: Hook<'_> = &mut keep_waiting();
+    let (client, observer, other) = (fake.attach(), fake.attach(), fake.attach());
+    let newer = |client: &Client| client.wait_newer(None, &mut keep_waiting()).unwrap();
+    client.step(&[], hook).unwrap();
+    let frame = newer(&observer).expect("it waits for one");
+    let seen = count(&frame);
+    drop(observer);
+    for _ in 0..20 {
+        client.step(&[], hook).unwrap();
+        newer(&other);
+    }
+    assert_eq!(count(&frame), seen);
+}
+
+#[test]
 fn facts_that_differ_are_refused_with_both_named() {
     let root = std::env::temp_dir().join(format!("tightloop-facts-{}", std::process::id()));
     let paths = DaemonPaths::new(Some(&root), "facts").unwrap();

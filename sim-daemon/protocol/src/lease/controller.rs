@@ -74,7 +74,7 @@ pub(crate) struct Controller {
     due: u64,
     frames: Arc<Alive>,
     publisher: CommandPublisher<S>,
-    subscriber: FrameSubscriber<S>,
+    subscriber: Arc<FrameSubscriber<S>>,
     listener: Sleeper<S>,
     service: FrameService<S>,
     /// Last, so that it ends last: the daemon must not think us gone before the ports are.
@@ -143,7 +143,7 @@ impl Controller {
             due: 0,
             frames: Arc::clone(frames),
             publisher,
-            subscriber,
+            subscriber: Arc::new(subscriber),
             listener,
             service,
             _heartbeat: HeartbeatThread::start(connection, epoch),
@@ -298,7 +298,14 @@ impl Controller {
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
         let base = payload.as_ptr() as usize;
-        Ok(Frame::new((header, base), sample, table, &self.frames))
+        let reader = Arc::clone(&self.subscriber);
+        Ok(Frame::new(
+            (header, base),
+            sample,
+            table,
+            &self.frames,
+            reader,
+        ))
     }
 }
 

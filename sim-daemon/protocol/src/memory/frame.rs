@@ -2,7 +2,9 @@
 
 use crate::doors::sync::atomic::{AtomicUsize, Ordering};
 use crate::doors::sync::{Arc, Mutex};
+use std::any::Any;
 use std::fmt;
+use std::mem::ManuallyDrop;
 
 use crate::doors::iceoryx2::sample::Sample;
 
@@ -12,6 +14,9 @@ use crate::memory::service::AnyThread;
 use crate::{Dtype, FrameHeader, Line, ProtocolError, Row, Table};
 
 pub(crate) type FrameSample = Port<Sample<AnyThread, [Line], FrameHeader>>;
+
+/// The port that a sample came by: once it is gone, the daemon writes to the slots of its samples again.
+pub(crate) type Reader = Arc<dyn Any + Send + Sync>;
 
 /// The state of all worlds (or, for an observer, of the first ones) at one instant.
 ///
@@ -24,6 +29,7 @@ pub struct Frame {
     base: usize,
     sample: Mutex<Option<FrameSample>>,
     alive: Arc<Alive>,
+    reader: ManuallyDrop<Reader>,
 }
 
 /// Frames of one subscription that are alive.
@@ -68,12 +74,14 @@ pub struct View<'a> {
 }
 
 impl Frame {
-    /// Wraps a sample whose table was checked against its payload; with its head, and the address of its payload.
+    /// Wraps a sample whose table was checked against its payload; with its head, the address of its payload, and the port that
+    /// it came by.
     pub(crate) fn new(
         (header, base): (FrameHeader, usize),
         sample: FrameSample,
         table: Arc<Table>,
         alive: &Arc<Alive>,
+        reader: Reader,
     ) -> Frame {
         alive.count.fetch_add(1, Ordering::Acquire);
         Frame {
@@ -82,6 +90,7 @@ impl Frame {
             base,
             sample: Mutex::new(Some(sample)),
             alive: Arc::clone(alive),
+            reader: ManuallyDrop::new(reader),
         }
     }
 
@@ -151,6 +160,8 @@ impl Drop for Frame {
         }
         // the slot goes back before the count goes down, so that the count never promises a slot that is not there
         drop(sample);
+        // SAFETY: nobody uses it afterwards.
+        unsafe { ManuallyDrop::drop(&mut self.reader) };
         self.alive.count.fetch_sub(1, Ordering::Release);
     }
 }
