@@ -371,6 +371,13 @@ impl Host {
     }
 }
 
+impl Drop for Host {
+    fn drop(&mut self) {
+        // first: who waits must not take its lease for lost, or a service for one that never was
+        self.daemon_lock.withdraw();
+    }
+}
+
 /// Refuses a run whose shared memory would not fit, or not beside the `physics_bytes` of its worlds, before anything is
 /// taken. Of several groups, each as described, all are counted.
 ///

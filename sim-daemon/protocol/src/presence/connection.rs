@@ -15,7 +15,7 @@ use crate::memory::service::AnyThread;
 use crate::memory::storage;
 use crate::presence::described::{self, Damage};
 use crate::presence::liveness::Peer;
-use crate::presence::paths::{DaemonPaths, Presence};
+use crate::presence::paths::Presence;
 use crate::presence::stop;
 use crate::transport::{self, Requester, Waker, handshake};
 use crate::waiting::SLICE;
@@ -191,19 +191,21 @@ impl Connection {
     pub(crate) fn shut_down(&self, hook: Hook<'_>) -> Result<(), ProtocolError> {
         let start = Instant::now();
         let (peer, daemon) = (&self.peer, self.peer.paths.daemon()?);
-        let runs = |paths: &DaemonPaths| match paths.presence() {
+        // one that ends is silent until all of its files are gone
+        let is_there = |presence| match presence {
             Ok(Presence::Running(beacon)) => beacon.pid == peer.beacon.pid,
-            _ => false,
+            presence => matches!(presence, Ok(Presence::Silent)),
         };
+        let lasts = || is_there(peer.presence()) || is_there(daemon.presence());
         // another run may have the name by now, which the file would end
-        if peer.check().is_err() && !runs(&daemon) {
+        if !lasts() {
             return Ok(());
         }
         // who waits hears the request, who is busy the file
         let ends = stop::asked(&daemon)?;
         self.post(&Request::Shutdown);
         self.notify();
-        while peer.check().is_ok() || runs(&daemon) {
+        while lasts() {
             if start.elapsed() > ANSWER_MAX {
                 return Err(peer.timeout(ANSWER_MAX));
             }

@@ -138,6 +138,12 @@ impl DaemonLock {
             .map_err(|error| ProtocolError::root(&self.paths.lock_path(), &error))
     }
 
+    /// Takes that line back: clients see that the daemon is gone before any of its files is, and find no run that ends.
+    pub(crate) fn withdraw(&self) {
+        // where that fails, they see it when the lock is free
+        let _ = self.file.set_len(0);
+    }
+
     /// Where this is.
     pub fn paths(&self) -> &DaemonPaths {
         &self.paths
@@ -156,6 +162,7 @@ impl Drop for DaemonLock {
     fn drop(&mut self) {
         let mut is_held = self.is_held.lock().unwrap_or_else(PoisonError::into_inner);
         if std::mem::take(&mut *is_held) {
+            self.withdraw();
             remove_shared_files(&self.paths, self.mark.take());
             remove_named_files(&self.paths);
         }
@@ -175,6 +182,8 @@ impl Remains {
         if !std::mem::take(&mut *is_held) {
             return;
         }
+        // as `DaemonLock::withdraw`
+        let _ = private().truncate(true).open(self.paths.lock_path());
         // other threads of ours may be making files
         for _ in 0..REMOVALS {
             remove_shared_files(&self.paths, None);

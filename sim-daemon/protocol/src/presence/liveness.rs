@@ -38,7 +38,7 @@ impl Peer {
         let restarted = || ProtocolError::DaemonRestarted {
             name: self.paths.name().to_owned(),
         };
-        match self.paths.presence_in(&self.lock)? {
+        match self.presence()? {
             Presence::Running(beacon) if beacon.session == self.beacon.session => Ok(()),
             Presence::Running(_) => Err(restarted()),
             // ours has announced itself: one that is starting, or cleaning up, is another
@@ -49,6 +49,11 @@ impl Peer {
                 }
             }
         }
+    }
+
+    /// What the lock file says that was there at first.
+    pub(crate) fn presence(&self) -> Result<Presence, ProtocolError> {
+        self.paths.presence_in(&self.lock)
     }
 
     pub(crate) fn lease_lost(&self) -> ProtocolError {
