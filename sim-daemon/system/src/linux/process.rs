@@ -1,9 +1,11 @@
 //! Other processes, as `/proc` shows them.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Duration;
 
+use rustix::io::Errno;
 use rustix::param::{clock_ticks_per_second, page_size};
 
 /// What this system lacks that the transport needs, and what to do.
@@ -25,8 +27,13 @@ pub fn is_gone(pid: u32, beside: u32) -> bool {
     if namespace("self") != namespace(&beside.to_string()) {
         return false;
     }
-    let Ok(status) = fs::read_to_string(format!("/proc/{pid}/stat")) else {
-        return true;
+    let status = match fs::read_to_string(format!("/proc/{pid}/stat")) {
+        Ok(status) => status,
+        // the second one ends between open and read; without a file to open, nothing is known
+        Err(error) => {
+            let ended = Some(Errno::SRCH.raw_os_error());
+            return error.kind() == ErrorKind::NotFound || error.raw_os_error() == ended;
+        }
     };
     // the name stands in parentheses and may have any character; the state comes after it
     let state = status
