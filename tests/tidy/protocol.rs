@@ -3,7 +3,7 @@
 use crate::{files, read};
 
 /// What a door leads to.
-const OUTSIDE: [&str; 10] = [
+const OUTSIDE: [&str; 12] = [
     "std::fs",
     "std::process",
     "std::sync",
@@ -14,6 +14,8 @@ const OUTSIDE: [&str; 10] = [
     "std::time::SystemTime",
     "sim_system",
     "iceoryx2",
+    ".exists()",
+    ".read_dir()",
 ];
 
 /// Files that have no part in a simulation, which has its own, and the doors themselves.

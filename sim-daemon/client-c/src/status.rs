@@ -125,7 +125,7 @@ fn status_of(error: &ProtocolError) -> Status {
         E::Malformed { .. } => Status::Malformed,
         E::SharedMemory { .. } | E::Memory { .. } => Status::Memory,
         E::Descriptors { .. } => Status::Descriptors,
-        E::Transport { .. } => Status::Transport,
+        E::Transport { .. } | E::Unreached { .. } => Status::Transport,
         _ => Status::Other,
     }
 }

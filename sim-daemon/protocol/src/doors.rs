@@ -7,7 +7,7 @@
 mod real {
     pub(crate) use ::{iceoryx2, iceoryx2_bb_posix};
     pub(crate) use sim_system as system;
-    pub(crate) use std::{fs, process, sync};
+    pub(crate) use std::{fs, process, sync, thread_local};
 
     /// Clocks.
     pub(crate) mod time {
@@ -46,7 +46,9 @@ mod real {
 #[cfg(simulated)]
 mod simulated {
     pub(crate) use sim_machine::fs::exists;
-    pub(crate) use sim_machine::{fs, iceoryx2, process, random, sync, system, thread, time};
+    pub(crate) use sim_machine::{
+        fs, iceoryx2, process, random, sync, system, thread, thread_local, time,
+    };
 
     /// The transport's descriptors.
     pub(crate) mod iceoryx2_bb_posix {

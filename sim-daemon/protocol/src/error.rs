@@ -332,6 +332,17 @@ pub enum ProtocolError {
         seconds: f64,
     },
 
+    /// The daemon lives, but none of its messages comes here.
+    #[error("daemon {name:?} (pid {pid}) cannot send to this process: {problem}")]
+    Unreached {
+        /// The daemon's name.
+        name: String,
+        /// Its process.
+        pid: u32,
+        /// What the daemon says.
+        problem: String,
+    },
+
     /// The caller's interrupt hook asked to stop waiting. The command itself may have been carried out.
     #[error("interrupted while waiting for the daemon")]
     Interrupted,
@@ -351,9 +362,12 @@ impl ProtocolError {
     pub fn transport(action: impl Into<String>, problem: impl std::fmt::Debug) -> Self {
         let action = action.into();
         let cause = take_problem().or_else(other_problem);
-        let system = match cause {
-            Some(Problem::System(error)) => Some(io::Error::from(error)),
-            _ => None,
+        let (system, place) = match &cause {
+            Some(Problem::System { error, path }) => {
+                let place = path.as_ref().map(|path| format!("{path}: "));
+                (Some(io::Error::from(*error)), place.unwrap_or_default())
+            }
+            _ => (None, String::new()),
         };
         match cause {
             Some(Problem::Full {
@@ -377,7 +391,7 @@ impl ProtocolError {
                         "this process may have no more memory; raise its limit (`ulimit -v unlimited`), or use fewer \
                          worlds ({error})"
                     ),
-                    (None, Some(error)) => format!("{problem:?}, {error}"),
+                    (None, Some(error)) => format!("{problem:?}, {place}{error}"),
                     (None, None) => format!("{problem:?}"),
                 };
                 ProtocolError::Transport { action, problem }

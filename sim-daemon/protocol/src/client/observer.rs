@@ -56,6 +56,8 @@ impl Observer {
         let Some(sample) = self.receive()? else {
             self.connection.peer.check()?;
             intact_there(&self.connection.peer)?;
+            let port = self.subscriber.id().value();
+            self.connection.peer.check_reach(&[port])?;
             return Ok(None);
         };
         let peer = &self.connection.peer;

@@ -9,7 +9,7 @@ use crate::doors::system::files::is_write_only;
 use crate::doors::system::process;
 
 /// Kinds of files that belong to ports.
-const OF_PORTS: [&str; 4] = ["connection", "data", "event", "event_mgmt"];
+const OF_PORTS: [&str; 5] = ["connection", "data", "event", "event_mgmt", "unreached"];
 /// A monitor has this file, one that ends in `_owner_lock` and one that ends in `_context`.
 const MONITOR: &str = "node_monitor";
 const CONTEXT: &str = "node_monitor_context";
@@ -158,8 +158,12 @@ mod tests {
         folder.touch(&format!("12345678_{HASH}_{LIVING}.data"));
         folder.touch(&format!("12345678_{HASH}_{LIVING}_{LIVING}.connection"));
         folder.touch(&format!("12345678_{HASH}_{DEAD}.dynamic"));
-        let stray = folder.touch(&format!("12345678_{HASH}_{DEAD}_{LIVING}.connection"));
-        assert_eq!(folder.orphans(&[]), HashSet::from([stray]));
+        folder.touch(&format!("0123456789abcdef_{LIVING}.unreached"));
+        let strays = [
+            folder.touch(&format!("12345678_{HASH}_{DEAD}_{LIVING}.connection")),
+            folder.touch(&format!("0123456789abcdef_{DEAD}.unreached")),
+        ];
+        assert_eq!(folder.orphans(&[]), HashSet::from(strays));
     }
 
     #[test]

@@ -23,6 +23,7 @@ use crate::memory::port::Port;
 use crate::presence::described::{self, Damage};
 use crate::presence::paths::DaemonPaths;
 use crate::transport::budget;
+use crate::transport::unreached::{self, Unreached};
 use crate::transport::{self, ControlService, Responder};
 use crate::waiting::affinity::CoreAffinity;
 use crate::waiting::clock;
@@ -333,6 +334,9 @@ impl State {
         // new observers get the frame shown last, dead ones give their slots back
         guarded(|| self.observers.refresh());
         let session = self.description.session;
+        for Unreached { port, error } in unreached::take() {
+            described::mark_unreached(&self.paths, session, port, &error);
+        }
         let waits =
             guarded(|| self.journals.refresh(session, &self.control)).unwrap_or_else(|| {
                 self.journals.lose();

@@ -173,6 +173,8 @@ impl Journal {
                 if let ControlFlow::Break(()) = hook() {
                     return Err(ProtocolError::Interrupted);
                 }
+                let port = self.subscriber.id().value();
+                self.connection.peer.check_reach(&[port])?;
             }
             if start.elapsed() >= timeout {
                 return Ok(None);

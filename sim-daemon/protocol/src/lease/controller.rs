@@ -16,8 +16,7 @@ use crate::memory::frame::{Alive, FrameSample};
 use crate::memory::guard::guarded;
 use crate::memory::loaned;
 use crate::memory::port::Port;
-use crate::presence::connection::{Connection, S, damaged, intact, intact_there, malformed, pause};
-use crate::presence::described::{self, Damage};
+use crate::presence::connection::{Connection, S, damaged, intact, intact_lease, malformed, pause};
 use crate::presence::liveness::Peer;
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber, Sleeper};
 use crate::waiting::affinity::CoreAffinity;
@@ -263,6 +262,7 @@ impl Controller {
             epoch: self.epoch,
             subscriber: &self.subscriber,
             service: &self.service,
+            ports: [self.subscriber.id().value(), self.publisher.id().value()],
             peer: &self.connection.peer,
             hook,
             since: Instant::now(),
@@ -387,6 +387,7 @@ struct Answer<'a> {
     epoch: u64,
     subscriber: &'a FrameSubscriber<S>,
     service: &'a FrameService<S>,
+    ports: [u128; 2],
     peer: &'a Peer,
     hook: Hook<'a>,
     since: Instant,
@@ -415,11 +416,8 @@ impl Awaited<FrameSample> for Answer<'_> {
             return Err(ProtocolError::Interrupted);
         }
         self.peer.check()?;
-        intact_there(self.peer)?;
-        let (session, lease) = (self.peer.beacon.session, Damage::Lease(self.epoch));
-        if described::is_damaged(&self.peer.paths, session, lease) {
-            return Err(damaged(self.peer, "wait for a frame"));
-        }
+        intact_lease(self.peer, self.epoch)?;
+        self.peer.check_reach(&self.ports)?;
         if self.service.dynamic_config().number_of_publishers() == 0 {
             return Err(self.peer.lease_lost());
         }

@@ -1,4 +1,5 @@
 //! Why shared memory could not be made or opened: the transport's own errors rarely know.
+#![cfg_attr(simulated, allow(dead_code))] // of memory that only the real transport has
 
 use std::cell::RefCell;
 use std::io;
@@ -28,7 +29,12 @@ pub(crate) enum Problem {
         path: String,
     },
     /// The system refuses, for example since there are too many open files.
-    System(SystemError),
+    System {
+        /// What it says.
+        error: SystemError,
+        /// The file, where it is known.
+        path: Option<String>,
+    },
 }
 
 /// What the system says, as it can be kept.
@@ -55,19 +61,22 @@ impl From<SystemError> for io::Error {
     }
 }
 
-thread_local! {
+crate::doors::thread_local! {
     static PROBLEM: RefCell<Option<Problem>> = const { RefCell::new(None) };
 }
 
 /// Why the last storage that this thread made or opened failed; once.
 pub(crate) fn take_problem() -> Option<Problem> {
-    PROBLEM.take()
+    PROBLEM.with(RefCell::take)
 }
 
 /// The problem of a call that made a file without us, if there is one with the file system.
 pub(crate) fn other_problem() -> Option<Problem> {
     match open_files::try_one() {
-        Err(error) => Some(Problem::System(error.into())),
+        Err(error) => Some(Problem::System {
+            error: error.into(),
+            path: None,
+        }),
         Ok(()) => no_room(FREE_MIN),
     }
 }
@@ -90,10 +99,18 @@ pub(crate) fn folder_cure(folder: &Path) -> &'static str {
 
 /// Notes why a call fails.
 pub(crate) fn failed(problem: Problem) {
-    PROBLEM.replace(Some(problem));
+    PROBLEM.with(|last| last.replace(Some(problem)));
 }
 
 impl Problem {
+    /// The system refuses a file.
+    pub(crate) fn of_file(path: &Path, error: io::Error) -> Problem {
+        Problem::System {
+            error: error.into(),
+            path: Some(path.to_string_lossy().into_owned()),
+        }
+    }
+
     /// The file system of a folder is full.
     pub(crate) fn full(folder: &Path, needed: u64) -> Problem {
         Problem::Full {

@@ -271,11 +271,16 @@ impl<T: Content> Builder<'_, T> {
             failed(problem);
             DynamicStorageCreateError::InternalError
         };
+        let path = path(&self.config, &self.name);
+        let system = |error| failed(Problem::of_file(&path, error));
         let folder = self.config.get_path_hint().to_string();
-        let file = new_file(FilePath::new(&folder), bytes as u64).map_err(failed)?;
+        let folder = FilePath::new(&folder);
+        let file = new_file(folder, bytes as u64).map_err(|error| match error.kind() {
+            ErrorKind::StorageFull => failed(Problem::full(folder, bytes as u64)),
+            _ => system(error),
+        })?;
         let ownership = (owner(&self.config), true);
-        let mapping = Mapping::new(file.file(), bytes, true, ownership)
-            .map_err(|error| failed(Problem::System(error.into())))?;
+        let mapping = Mapping::new(file.file(), bytes, true, ownership).map_err(system)?;
         let storage = Storage {
             mapping: ManuallyDrop::new(mapping),
             config: self.config.clone(),
@@ -292,12 +297,12 @@ impl<T: Content> Builder<'_, T> {
         if !self.initializer.call(value, &mut allocator) {
             return Err(DynamicStorageCreateError::InitializationFailed);
         }
-        match file.publish(&path(&self.config, &self.name)) {
+        match file.publish(&path) {
             Ok(()) => {}
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
                 return Err(DynamicStorageCreateError::AlreadyExists);
             }
-            Err(error) => return Err(failed(Problem::System(error.into()))),
+            Err(error) => return Err(system(error)),
         }
         if self.has_ownership {
             storage.acquire_ownership();
@@ -309,7 +314,7 @@ impl<T: Content> Builder<'_, T> {
         let path = path(&self.config, &self.name);
         let may_write = matches!(access, AccessMode::ReadWrite);
         let system = |error: io::Error| {
-            failed(Problem::System(error.into()));
+            failed(Problem::of_file(&path, error));
             DynamicStorageOpenError::InternalError
         };
         let file = match private().write(may_write).open(&path) {
@@ -369,12 +374,9 @@ pub(crate) fn run_of(config: &Config) -> u64 {
 }
 
 /// A new file with its pages, which has no name yet.
-fn new_file(folder: &FilePath, bytes: u64) -> Result<NewFile, Problem> {
+fn new_file(folder: &FilePath, bytes: u64) -> io::Result<NewFile> {
     let ends = (READER_RESERVES.get() && bytes > 2 * MANAGEMENT).then_some(MANAGEMENT);
-    NewFile::create(folder, bytes, ends).map_err(|error| match error.kind() {
-        ErrorKind::StorageFull => Problem::full(folder, bytes),
-        _ => Problem::System(error.into()),
-    })
+    NewFile::create(folder, bytes, ends)
 }
 
 /// Where the file of a name is.

@@ -76,7 +76,8 @@ impl Connection {
         let start = Instant::now();
         loop {
             match receiver.recv_timeout(SLICE) {
-                Ok(opened) => return opened,
+                // that it has ended explains more
+                Ok(opened) => return opened.or_else(|error| peer.check().and(Err(error))),
                 Err(RecvTimeoutError::Timeout) if start.elapsed() < ANSWER_MAX => {}
                 // it waits still, or it panicked
                 Err(_) => return Err(damaged(peer, "attach")),
@@ -145,7 +146,7 @@ impl Connection {
             ProtocolError::transport(format!("send {request:?}"), error)
         };
         let damaged = || damaged(&self.peer, "ask the daemon");
-        let pending = {
+        let (port, pending) = {
             // not while waiting: the hook runs the caller's code
             let requester = lock(&self.requester);
             let loan = guarded(|| requester.loan_slice_uninit(text.len()))
@@ -154,7 +155,10 @@ impl Connection {
             let pending = guarded(|| loan.write_from_slice(&text).send())
                 .ok_or_else(damaged)?
                 .map_err(|error| failed(&error))?;
-            Port::with_owner(requester.owner(), pending)
+            (
+                requester.id().value(),
+                Port::with_owner(requester.owner(), pending),
+            )
         };
         self.notify();
         let (start, mut nap, mut polled) =
@@ -174,6 +178,7 @@ impl Connection {
             if polled.elapsed() > SLICE {
                 self.peer.check()?;
                 intact_there(&self.peer)?;
+                self.peer.check_reach(&[port])?;
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
                 }
@@ -300,6 +305,15 @@ pub(crate) fn intact_there(peer: &Peer) -> Result<(), ProtocolError> {
     match described::is_damaged(&peer.paths, peer.beacon.session, Damage::Daemon) {
         true => Err(damaged(peer, "wait for the daemon")),
         false => intact(peer),
+    }
+}
+
+/// As [`intact_there`], while this process holds a lease.
+pub(crate) fn intact_lease(peer: &Peer, epoch: u64) -> Result<(), ProtocolError> {
+    intact_there(peer)?;
+    match described::is_damaged(&peer.paths, peer.beacon.session, Damage::Lease(epoch)) {
+        true => Err(damaged(peer, "wait for a frame")),
+        false => Ok(()),
     }
 }
 

@@ -1,6 +1,7 @@
-//! What a daemon says of itself in files of its folder: its description, which may be large and which every client reads once, and
-//! that its shared memory is damaged.
+//! What a daemon says of itself in files of its folder: its description, which may be large and which every client reads once,
+//! that its shared memory is damaged, and which ports of clients it cannot reach.
 
+use crate::doors::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 
@@ -12,6 +13,8 @@ use crate::{Description, ProtocolError};
 
 /// Longest description that a client reads [bytes].
 const BYTES_MAX: u64 = 1 << 28;
+/// Longest reason that a client reads [bytes].
+const REASON_MAX: u64 = 4096;
 
 fn path(paths: &DaemonPaths, session: u64) -> PathBuf {
     paths
@@ -76,4 +79,41 @@ pub(crate) fn mark_damaged(paths: &DaemonPaths, session: u64, damage: Damage) {
 /// Whether the daemon has found a damage. A few microseconds.
 pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64, damage: Damage) -> bool {
     exists(&mark(paths, session, damage))
+}
+
+fn unreached(paths: &DaemonPaths, session: u64, port: u128) -> PathBuf {
+    // as the transport names what belongs to a port, so that it goes when the port is gone
+    let name = format!("{session:016x}_{port}.unreached");
+    paths.shared_folder().join(name)
+}
+
+/// Tells a client why the daemon cannot reach its port.
+pub(crate) fn mark_unreached(
+    paths: &DaemonPaths,
+    session: u64,
+    port: u128,
+    reason: &ProtocolError,
+) {
+    let path = unreached(paths, session, port);
+    let unnamed = path.with_extension("unreached_new");
+    // a client that cannot be told waits for as long as it does
+    if let Ok(mut file) = private().create(true).truncate(true).open(&unnamed) {
+        let _ = file.write_all(reason.to_string().as_bytes());
+        let _ = fs::rename(unnamed, path);
+    }
+}
+
+/// Why the daemon cannot reach a port, where it cannot. A few microseconds.
+pub(crate) fn why_unreached(paths: &DaemonPaths, session: u64, port: u128) -> Option<String> {
+    let path = unreached(paths, session, port);
+    if !exists(&path) {
+        return None;
+    }
+    let mut reason = String::new();
+    if let Ok(file) = private().open(&path) {
+        let _ = file.take(REASON_MAX).read_to_string(&mut reason);
+    }
+    // there was no room for it
+    let unknown = || format!("see {}", path.display());
+    Some(if reason.is_empty() { unknown() } else { reason })
 }

@@ -5,6 +5,7 @@ use crate::doors::sync::Arc;
 use std::time::Duration;
 
 use crate::ProtocolError;
+use crate::presence::described;
 use crate::presence::paths::{Beacon, DaemonPaths, Presence};
 
 /// The daemon that a client attached to.
@@ -54,6 +55,19 @@ impl Peer {
     /// What the lock file says that was there at first.
     pub(crate) fn presence(&self) -> Result<Presence, ProtocolError> {
         self.paths.presence_in(&self.lock)
+    }
+
+    /// Errors when the daemon has found that it cannot reach one of our ports.
+    pub(crate) fn check_reach(&self, ports: &[u128]) -> Result<(), ProtocolError> {
+        let why = |&port| described::why_unreached(&self.paths, self.beacon.session, port);
+        match ports.iter().find_map(why) {
+            None => Ok(()),
+            Some(problem) => Err(ProtocolError::Unreached {
+                name: self.paths.name().to_owned(),
+                pid: self.beacon.pid,
+                problem,
+            }),
+        }
     }
 
     pub(crate) fn lease_lost(&self) -> ProtocolError {

@@ -7,7 +7,7 @@ use crate::doors::iceoryx2::port::server::Server;
 use crate::doors::iceoryx2::prelude::*;
 use crate::doors::iceoryx2::service::port_factory::request_response;
 
-use super::{CLIENTS_MAX, service_name};
+use super::{CLIENTS_MAX, service_name, unreached};
 use crate::ProtocolError;
 use crate::memory::port::Port;
 use crate::wire::control::{REQUEST_MAX, RESPONSE_MAX};
@@ -65,6 +65,8 @@ pub(crate) fn responder<S: Service>(
         .initial_max_slice_len(RESPONSE_MAX)
         .max_loaned_responses_per_request(1)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .set_request_degradation_handler(unreached::senders())
+        .set_response_degradation_handler(unreached::receivers())
         .create()
         .map(|port| Port::with_owner(service.owner(), port))
         .map_err(|error| ProtocolError::transport("create the control server", error))
@@ -77,11 +79,15 @@ pub(crate) fn requester<S: Service>(node: &Node<S>) -> Result<Requester<S>, Prot
         .request_response::<[u8], [u8]>()
         .open()
         .map_err(|error| ProtocolError::transport("open service control", error))?;
-    service
-        .client_builder()
-        .initial_max_slice_len(REQUEST_MAX)
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map(|port| Port::new(node.config(), port))
-        .map_err(|error| ProtocolError::transport("create a control client", error))
+    unreached::reaching(|| {
+        service
+            .client_builder()
+            .initial_max_slice_len(REQUEST_MAX)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_request_degradation_handler(unreached::receivers())
+            .set_response_degradation_handler(unreached::senders())
+            .create()
+            .map(|port| Port::new(node.config(), port))
+            .map_err(|error| ProtocolError::transport("create a control client", error))
+    })
 }

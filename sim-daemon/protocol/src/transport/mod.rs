@@ -3,6 +3,7 @@
 mod attached;
 pub(crate) mod budget;
 mod control;
+pub(crate) mod unreached;
 
 use crate::doors::sync::Once;
 use std::fmt::Debug;
@@ -197,14 +198,17 @@ fn publisher<S: Service, H: Debug + Default + ZeroCopySend>(
     lines: usize,
     what: &str,
 ) -> Result<Port<Publisher<S, [Line], H>>, ProtocolError> {
-    service
-        .publisher_builder()
-        .initial_max_slice_len(lines)
-        .max_loaned_samples(LOANS)
-        .backpressure_strategy(BackpressureStrategy::DiscardData)
-        .create()
-        .map(|port| Port::with_owner(service.owner(), port))
-        .map_err(|error| ProtocolError::transport(format!("create a {what} publisher"), error))
+    unreached::reaching(|| {
+        service
+            .publisher_builder()
+            .initial_max_slice_len(lines)
+            .max_loaned_samples(LOANS)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_degradation_handler(unreached::receivers())
+            .create()
+            .map(|port| Port::with_owner(service.owner(), port))
+            .map_err(|error| ProtocolError::transport(format!("create a {what} publisher"), error))
+    })
 }
 
 /// Service of frames for observers.
@@ -249,13 +253,16 @@ pub(crate) fn frame_publisher<S: Service>(
 pub(crate) fn frame_subscriber<S: Service>(
     service: &FrameService<S>,
 ) -> Result<FrameSubscriber<S>, ProtocolError> {
-    service
-        .subscriber_builder()
-        .buffer_size(BUFFER)
-        .history_request(0)
-        .create()
-        .map(|port| Port::with_owner(service.owner(), port))
-        .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
+    unreached::reaching(|| {
+        service
+            .subscriber_builder()
+            .buffer_size(BUFFER)
+            .history_request(0)
+            .set_degradation_handler(unreached::senders())
+            .create()
+            .map(|port| Port::with_owner(service.owner(), port))
+            .map_err(|error| ProtocolError::transport("create a frame subscriber", error))
+    })
 }
 
 /// Service of commands of lease `epoch`: one publisher, which is what makes it a lease.
@@ -280,24 +287,27 @@ pub(crate) fn watch_subscriber<S: Service>(
     name: &str,
 ) -> Result<FrameSubscriber<S>, ProtocolError> {
     let service = open_watch(node)?;
-    let subscriber = service
-        .subscriber_builder()
-        .buffer_size(BUFFER)
-        // the newest frame at once
-        .history_request(1)
-        .create();
-    match subscriber {
-        Ok(port) => Ok(Port::with_owner(service.owner(), port)),
-        Err(SubscriberCreateError::ExceedsMaxSupportedSubscribers) => {
-            Err(ProtocolError::TooManyClients {
-                name: name.to_owned(),
-                what: "observers",
-                max: OBSERVERS_MAX,
-                holders: String::new(),
-            })
+    unreached::reaching(|| {
+        let subscriber = service
+            .subscriber_builder()
+            .buffer_size(BUFFER)
+            // the newest frame at once
+            .history_request(1)
+            .set_degradation_handler(unreached::senders())
+            .create();
+        match subscriber {
+            Ok(port) => Ok(Port::with_owner(service.owner(), port)),
+            Err(SubscriberCreateError::ExceedsMaxSupportedSubscribers) => {
+                Err(ProtocolError::TooManyClients {
+                    name: name.to_owned(),
+                    what: "observers",
+                    max: OBSERVERS_MAX,
+                    holders: String::new(),
+                })
+            }
+            Err(error) => Err(ProtocolError::transport("create a frame subscriber", error)),
         }
-        Err(error) => Err(ProtocolError::transport("create a frame subscriber", error)),
-    }
+    })
 }
 
 /// The end of a service of commands that sends.
@@ -312,11 +322,14 @@ pub(crate) fn command_publisher<S: Service>(
 pub(crate) fn command_subscriber<S: Service>(
     service: &CommandService<S>,
 ) -> Result<CommandSubscriber<S>, ProtocolError> {
-    service
-        .subscriber_builder()
-        .create()
-        .map(|port| Port::with_owner(service.owner(), port))
-        .map_err(|error| ProtocolError::transport("create a command subscriber", error))
+    unreached::reaching(|| {
+        service
+            .subscriber_builder()
+            .set_degradation_handler(unreached::senders())
+            .create()
+            .map(|port| Port::with_owner(service.owner(), port))
+            .map_err(|error| ProtocolError::transport("create a command subscriber", error))
+    })
 }
 
 /// Number of slots of a journal in which `depth` entries may wait.
@@ -353,11 +366,14 @@ pub(crate) fn journal_publisher<S: Service>(
 pub(crate) fn journal_subscriber<S: Service>(
     service: &JournalService<S>,
 ) -> Result<JournalSubscriber<S>, ProtocolError> {
-    service
-        .subscriber_builder()
-        .create()
-        .map(|port| Port::with_owner(service.owner(), port))
-        .map_err(|error| ProtocolError::transport("create a journal subscriber", error))
+    unreached::reaching(|| {
+        service
+            .subscriber_builder()
+            .set_degradation_handler(unreached::senders())
+            .create()
+            .map(|port| Port::with_owner(service.owner(), port))
+            .map_err(|error| ProtocolError::transport("create a journal subscriber", error))
+    })
 }
 
 /// Creates an event service; `attributes` are the handshake's facts.

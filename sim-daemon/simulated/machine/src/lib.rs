@@ -20,5 +20,7 @@ pub mod system;
 pub mod thread;
 pub mod time;
 
+pub use shuttle::thread_local;
+
 pub use run::{Outcome, Run, at, calm};
 pub use world::{note, random, step};

@@ -19,7 +19,7 @@ use crate::plan::Act;
 const CALL_MAX: u64 = 14_000_000_000;
 
 /// The same where calls of the system fail [ns].
-const ANSWER_MAX: u64 = 140_000_000_000;
+const ANSWER_MAX: u64 = 40_000_000_000;
 
 /// What a client has.
 pub struct Actor {

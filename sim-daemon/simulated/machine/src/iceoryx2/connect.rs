@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use super::bag::{Entry, Role};
+use super::degradation::degrade;
 use super::queue::{Connection, End, Link};
 use super::wires::Wires;
 use crate::world::{World, step, system_call, with};
@@ -103,18 +104,24 @@ pub(crate) fn refresh(port: u128, forced: bool) {
     }
 }
 
-/// Joins a connection; what fails is left until the list changes.
-fn join(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &Entry) {
+/// Joins a connection; what fails is reported, and left until the list changes.
+fn join(plan: &Plan, ports: (u128, u128), end: End, other: &Entry) {
+    if !is_joined(plan, ports, end, other) {
+        degrade(plan.service, ports, end);
+    }
+}
+
+fn is_joined(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &Entry) -> bool {
     let own = match end {
         End::Sender => sender,
         End::Receiver => receiver,
     };
     if system_call("opens a connection").is_err() {
-        return;
+        return false;
     }
     let Some(connection) = with(|world| world.connection(plan, (sender, receiver), end, other))
     else {
-        return;
+        return false;
     };
     step("joins a connection");
     let joined = with(|world| {
@@ -122,7 +129,7 @@ fn join(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &Entry) 
         joined.is_some_and(|joined| joined.join(end))
     });
     if !joined {
-        return;
+        return false;
     }
     match end {
         End::Sender => with(|world| {
@@ -136,9 +143,11 @@ fn join(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &Entry) 
                 && with(|world| world.open_segment(own, sender, connection));
             if !opened {
                 leave(connection, End::Receiver);
+                return false;
             }
         }
     }
+    true
 }
 
 impl World {

@@ -10,6 +10,7 @@ pub mod active_request;
 mod bag;
 mod cleanup;
 mod connect;
+mod degradation;
 pub mod identifiers;
 mod membership;
 mod names;

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::bag::{Entry, Lane, Role};
+use super::degradation::Handler;
 use super::names::Names;
 use super::slot::Slot;
 use super::wires::Parcel;
 
 /// Which end of a connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum End {
     Sender,
     Receiver,
@@ -64,6 +65,7 @@ pub(crate) struct Outlet {
     pub(crate) history: VecDeque<usize>,
     history_max: usize,
     pub(crate) requests: RequestCounts,
+    pub(crate) handler: Option<Handler>,
 }
 
 /// What a client knows of its requests.
@@ -90,6 +92,7 @@ pub(crate) struct Inlet {
     pub(crate) expired: Vec<u64>,
     pub(crate) links: BTreeMap<u64, Link>,
     pub(crate) entry: Entry,
+    pub(crate) handler: Option<Handler>,
 }
 
 /// The end of a connection at a receiver.
@@ -186,6 +189,7 @@ impl Outlet {
             history: VecDeque::new(),
             history_max,
             requests: RequestCounts::default(),
+            handler: None,
         }
     }
 
@@ -231,6 +235,7 @@ impl Inlet {
             expired: Vec::new(),
             links: BTreeMap::new(),
             entry,
+            handler: None,
         }
     }
 }

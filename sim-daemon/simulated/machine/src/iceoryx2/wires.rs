@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::bag::Service;
+use super::degradation::Handler;
 use super::node::NodeDetails;
-use super::queue::{Connection, Inlet, Outlet};
+use super::queue::{Connection, End, Inlet, Outlet};
 use super::slot::Slot;
 use crate::memory::mapping::Damages;
 use crate::thread::ThreadId;
@@ -35,6 +36,8 @@ pub(crate) struct Wires {
     pub(crate) cleaning: BTreeSet<u32>,
     /// Slots that were written to while a process that lives read them.
     pub(crate) overwritten: u64,
+    /// What ports that threads are about to make do where they cannot meet others.
+    pub(crate) handlers: BTreeMap<(ThreadId, End), Handler>,
     /// Threads whose ports take their memory later.
     pub(crate) reserving: BTreeSet<ThreadId>,
     pub(crate) damages: Damages,

@@ -6,7 +6,7 @@ use super::{LoanError, ReceiveError};
 use crate::iceoryx2::bag::{Entry, Role};
 use crate::iceoryx2::connect::{self, refresh};
 use crate::iceoryx2::membership::{self, Port, Refused, ServiceHandle};
-use crate::iceoryx2::queue::{Inlet, Outlet, Received, TooMany};
+use crate::iceoryx2::queue::{End, Inlet, Outlet, Received, TooMany};
 use crate::iceoryx2::slot::{ALIGNMENT, Slot};
 use crate::iceoryx2::wires::Parcel;
 use crate::world::{is_on, me, step, with};
@@ -62,6 +62,7 @@ pub(crate) fn open_outlet(port: &Port, slots: Slots) -> Result<(), Refused> {
         outlet.loans_max = slots.loans_max;
         outlet.length_max = slots.length_max;
         outlet.slot_bytes = slots.bytes;
+        outlet.handler = world.wires.handlers.remove(&(me(), End::Sender));
         world.wires.outlets.insert(port.id, outlet);
         world.wires.segments.insert(port.id);
     });
@@ -72,7 +73,8 @@ pub(crate) fn open_outlet(port: &Port, slots: Slots) -> Result<(), Refused> {
 pub(crate) fn open_inlet(port: &Port, entry: Entry) {
     with(|world| {
         let place = (port.node.id, port.service_id, port.role);
-        let inlet = Inlet::new(place, port.node.names.clone(), entry);
+        let mut inlet = Inlet::new(place, port.node.names.clone(), entry);
+        inlet.handler = world.wires.handlers.remove(&(me(), End::Receiver));
         world.wires.inlets.insert(port.id, inlet);
     });
 }

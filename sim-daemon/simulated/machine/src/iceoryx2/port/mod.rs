@@ -9,6 +9,9 @@ pub mod server;
 pub mod subscriber;
 pub mod update_connections;
 
+pub use crate::iceoryx2::degradation::{
+    DegradationAction, DegradationCause, DegradationFn, DegradationInfo,
+};
 pub use ::iceoryx2::port::LoanError;
 pub(crate) use loan::{Borrow, Loan};
 

@@ -8,9 +8,11 @@ use ::iceoryx2::prelude::{AttributeSet, BackpressureStrategy, ServiceName, ZeroC
 
 use crate::iceoryx2::Types;
 use crate::iceoryx2::bag::{Role, Settings};
+use crate::iceoryx2::degradation::{DegradationFn, set};
 use crate::iceoryx2::membership::{Dynamic, ServiceHandle};
 use crate::iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use crate::iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use crate::iceoryx2::queue::End;
 use crate::iceoryx2::service::Service;
 
 /// A service that is open.
@@ -111,6 +113,13 @@ where
         self
     }
 
+    /// What is done where a subscriber cannot be met.
+    #[must_use]
+    pub fn set_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Sender, handler);
+        self
+    }
+
     /// Full buffers never wait here.
     #[must_use]
     pub fn backpressure_strategy(self, _strategy: BackpressureStrategy) -> Self {
@@ -135,6 +144,13 @@ pub struct SubscriberBuilder<'a, S: Service, P: Debug + ?Sized, H: Debug> {
 }
 
 impl<S: Service, P: Debug + ?Sized, H: Debug + ZeroCopySend> SubscriberBuilder<'_, S, P, H> {
+    /// What is done where a publisher cannot be met.
+    #[must_use]
+    pub fn set_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Receiver, handler);
+        self
+    }
+
     /// Samples that wait at most.
     #[must_use]
     pub fn buffer_size(mut self, size: usize) -> Self {

@@ -12,10 +12,12 @@ pub use ::iceoryx2::service::port_factory::server::ServerCreateError;
 
 use crate::iceoryx2::RequestTypes;
 use crate::iceoryx2::bag::{Role, Settings};
+use crate::iceoryx2::degradation::{DegradationFn, set};
 use crate::iceoryx2::identifiers::{UniqueClientId, UniqueNodeId};
 use crate::iceoryx2::membership::{Dynamic, ServiceHandle};
 use crate::iceoryx2::port::client::Client;
 use crate::iceoryx2::port::server::Server;
+use crate::iceoryx2::queue::End;
 use crate::iceoryx2::service::Service;
 
 /// What asks with slices.
@@ -157,6 +159,20 @@ where
     R: Debug + ZeroCopySend + 'static,
     RH: Debug + ZeroCopySend,
 {
+    /// What is done where the other side cannot be met by requests.
+    #[must_use]
+    pub fn set_request_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Sender, handler);
+        self
+    }
+
+    /// What is done where the other side cannot be met by responses.
+    #[must_use]
+    pub fn set_response_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Receiver, handler);
+        self
+    }
+
     /// Entries of a request at most.
     #[must_use]
     pub fn initial_max_slice_len(mut self, most: usize) -> Self {
@@ -202,6 +218,20 @@ where
     R: Debug + ZeroCopySend + 'static,
     RH: Debug + ZeroCopySend,
 {
+    /// What is done where the other side cannot be met by requests.
+    #[must_use]
+    pub fn set_request_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Receiver, handler);
+        self
+    }
+
+    /// What is done where the other side cannot be met by responses.
+    #[must_use]
+    pub fn set_response_degradation_handler(self, handler: impl DegradationFn + 'static) -> Self {
+        set(End::Sender, handler);
+        self
+    }
+
     /// Entries of an answer at most.
     #[must_use]
     pub fn initial_max_slice_len(mut self, most: usize) -> Self {
