@@ -7,14 +7,25 @@ use std::fs::File;
 use std::io;
 use std::io::Write;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError, channel};
+use std::sync::atomic::Ordering;
+#[cfg(not(loom))]
+use std::sync::{atomic::AtomicU64, mpsc};
+#[cfg(not(loom))]
+use std::thread;
+#[cfg(not(loom))]
 use std::time::{Duration, Instant};
 
+#[cfg(loom)]
+use loom::sync::atomic::AtomicU64;
 use sim_system::{signals, streams};
 
+#[cfg(loom)]
+use crate::doors::time::{Duration, Instant};
+#[cfg(loom)]
+use crate::doors::{mpsc, thread};
 use crate::error::DaemonError;
 use crate::terminal::printable;
+use mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError, channel};
 
 /// Messages that wait at most [–]: the notes of a large scene come at once.
 const QUEUE: usize = 1024;
@@ -58,10 +69,10 @@ impl Printer {
 
     /// Starts a thread that writes to `target`.
     pub(crate) fn start(target: impl Write + Send + 'static) -> Result<Printer, DaemonError> {
-        let (queue, items) = std::sync::mpsc::sync_channel(QUEUE);
+        let (queue, items) = mpsc::sync_channel(QUEUE);
         let dropped = Arc::new(AtomicU64::new(0));
         let counter = Arc::clone(&dropped);
-        std::thread::Builder::new()
+        thread::Builder::new()
             .name("tightloop-printer".to_owned())
             .spawn(move || {
                 signals::keep_writing_in_the_background();
@@ -89,7 +100,7 @@ impl Printer {
                 return;
             }
             item = same;
-            std::thread::sleep(RETRY);
+            thread::sleep(RETRY);
         }
         // what is not written by then is lost
         let _ = written.recv_timeout(deadline.saturating_duration_since(Instant::now()));
@@ -150,7 +161,7 @@ fn report_dropped(target: &mut impl Write, dropped: &AtomicU64) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use std::io::{BufRead, BufReader, Read};
 
@@ -203,5 +214,80 @@ mod tests {
             printer.print("line\n".to_owned());
         }
         flush([&printer]);
+    }
+}
+
+#[cfg(all(test, loom))]
+mod models {
+    use super::*;
+    use crate::doors::time;
+    use std::sync::Mutex;
+
+    /// What was written; the threads of a model take turns.
+    #[derive(Debug, Clone, Default)]
+    struct Page(Arc<Mutex<String>>);
+
+    impl Page {
+        fn lines(&self) -> Vec<String> {
+            let text = self.0.lock().unwrap();
+            text.lines().map(str::to_owned).collect()
+        }
+    }
+
+    impl Write for Page {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let text = std::str::from_utf8(bytes).unwrap();
+            self.0.lock().unwrap().push_str(text);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Runs a model with a printer, in every order of a few switches between threads.
+    fn model(run: fn(Printer, Page)) {
+        let mut orders = loom::model::Builder::new();
+        orders.preemption_bound = Some(2);
+        orders.check(move || {
+            time::begin();
+            let page = Page::default();
+            run(Printer::start(page.clone()).unwrap(), page);
+        });
+    }
+
+    #[test]
+    fn a_flush_returns_when_each_message_is_written_or_counted() {
+        model(|printer, page| {
+            let messages = mpsc::BOUND + 2;
+            for index in 0..messages {
+                printer.print(format!("{index}\n"));
+            }
+            flush([&printer]);
+            let (mut written, mut dropped) = (Vec::new(), 0);
+            for line in page.lines() {
+                match line.parse::<usize>() {
+                    Ok(index) => written.push(index),
+                    Err(_) => dropped += line.split(' ').nth(1).unwrap().parse::<usize>().unwrap(),
+                }
+            }
+            assert!(written.is_sorted(), "{written:?}");
+            assert_eq!(written.len() + dropped, messages, "{written:?}");
+        });
+    }
+
+    #[test]
+    fn messages_of_two_threads_are_all_written_where_there_is_room() {
+        model(|printer, page| {
+            let other = printer.clone();
+            let thread = thread::spawn(move || other.print("other\n".to_owned()));
+            printer.print("one\n".to_owned());
+            thread.join().unwrap();
+            flush([&printer]);
+            let mut lines = page.lines();
+            lines.sort();
+            assert_eq!(lines, ["one", "other"]);
+        });
     }
 }

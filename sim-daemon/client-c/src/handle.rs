@@ -3,11 +3,15 @@
 //! Their memory is used again and never freed. So a pointer to a client that was detached leads to an empty [`Slot`], which
 //! is an error, or to a newer client, but never to freed memory. It also spares a step its allocation.
 
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+#[cfg(not(loom))]
+use std::sync::{Mutex, MutexGuard};
+use std::sync::{OnceLock, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
 use sim_protocol::Maker;
 
+#[cfg(loom)]
+use crate::doors::sync::{Mutex, MutexGuard};
 use crate::status::{Failure, Status};
 
 /// Much longer than any thread has a [`Lock`].
@@ -107,7 +111,7 @@ impl<H> Pool<H> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
 
@@ -126,5 +130,72 @@ mod tests {
         );
         assert_eq!(first.take(), None);
         assert!(std::ptr::eq(POOL.lend(Slot::empty), first));
+    }
+}
+
+#[cfg(all(test, loom))]
+mod models {
+    use super::*;
+    use loom::thread;
+
+    /// A pool of its own in each order, and a handle of it.
+    fn pool() -> (&'static Pool<Slot<u32>>, &'static Slot<u32>) {
+        let pool: &Pool<Slot<u32>> = Box::leak(Box::new(Pool::new()));
+        let handle = pool.lend(Slot::empty);
+        handle.fill(7);
+        (pool, handle)
+    }
+
+    fn detach(pool: &Pool<Slot<u32>>, handle: &'static Slot<u32>) -> bool {
+        let value = handle.take();
+        if value.is_some() {
+            pool.give_back(handle);
+        }
+        value.is_some()
+    }
+
+    #[test]
+    fn a_handle_that_two_threads_detach_is_given_back_once() {
+        loom::model(|| {
+            let (pool, handle) = pool();
+            let other = thread::spawn(move || detach(pool, handle));
+            let first = detach(pool, handle);
+            assert!(first != other.join().unwrap());
+            let (one, two) = (pool.lend(Slot::empty), pool.lend(Slot::empty));
+            assert!(std::ptr::eq(one, handle) && !std::ptr::eq(one, two));
+        });
+    }
+
+    #[test]
+    fn who_uses_a_handle_that_another_thread_detaches_gets_its_value_an_error_or_a_newer_value() {
+        loom::model(|| {
+            let (pool, handle) = pool();
+            let other = thread::spawn(move || {
+                assert!(detach(pool, handle));
+                pool.lend(Slot::empty).fill(8);
+            });
+            let looked = handle.with("stale", |value| Ok(*value));
+            assert!(match looked {
+                Ok(value) => value == 7 || value == 8,
+                Err(failure) => failure.status == Status::StaleHandle,
+            });
+            other.join().unwrap();
+            assert_eq!(handle.with("stale", |value| Ok(*value)).unwrap(), 8);
+        });
+    }
+
+    #[test]
+    fn two_threads_are_lent_two_handles() {
+        loom::model(|| {
+            let (pool, handle) = pool();
+            assert!(detach(pool, handle));
+            let lend = move || {
+                let lent = pool.lend(Slot::empty);
+                lent.fill(1);
+                std::ptr::from_ref(lent) as usize
+            };
+            let other = thread::spawn(lend);
+            assert_ne!(lend(), other.join().unwrap());
+        });
     }
 }

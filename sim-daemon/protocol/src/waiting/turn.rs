@@ -63,14 +63,18 @@ impl<T> Turn<T> {
             return Err(ProtocolError::CallInProgress);
         }
         if state.value.is_none() || state.passed_on {
-            drop(state);
-            return self.wait(me, hook);
+            // under the same lock: who leaves must see us wait
+            return self.wait(state, me, hook);
         }
         Ok(self.hand_over(&mut state, me))
     }
 
-    fn wait(&self, me: ThreadId, hook: Hook<'_>) -> Result<Held<'_, T>, ProtocolError> {
-        let mut state = lock(&self.state);
+    fn wait<'a>(
+        &'a self,
+        mut state: MutexGuard<'a, State<T>>,
+        me: ThreadId,
+        hook: Hook<'_>,
+    ) -> Result<Held<'a, T>, ProtocolError> {
         state.waiting += 1;
         loop {
             state = self
@@ -78,18 +82,21 @@ impl<T> Turn<T> {
                 .wait_timeout(state, SLICE)
                 .unwrap_or_else(PoisonError::into_inner)
                 .0;
+            if state.value.is_none() {
+                drop(state);
+                let interrupted = hook().is_break();
+                state = lock(&self.state);
+                if interrupted {
+                    state.waiting -= 1;
+                    self.pass_on(&mut state);
+                    return Err(ProtocolError::Interrupted);
+                }
+            }
+            // it may have come while the hook ran, and nobody is notified twice
             if state.value.is_some() {
                 state.waiting -= 1;
                 state.passed_on = false;
                 return Ok(self.hand_over(&mut state, me));
-            }
-            drop(state);
-            let interrupted = hook().is_break();
-            state = lock(&self.state);
-            if interrupted {
-                state.waiting -= 1;
-                self.pass_on(&mut state);
-                return Err(ProtocolError::Interrupted);
             }
         }
     }
@@ -145,7 +152,7 @@ impl<T> DerefMut for Held<'_, T> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
     use crate::waiting::hook::keep_waiting;
@@ -197,6 +204,77 @@ mod tests {
                 turns.fetch_add(1, Ordering::Relaxed);
             }
             busy.join().unwrap();
+        });
+    }
+}
+
+/// In every order; a wait that nobody ends fails, since time never passes there but for [`time_passes`].
+#[cfg(all(test, loom))]
+mod models {
+    use super::*;
+    use crate::waiting::hook::keep_waiting;
+    use loom::sync::Arc;
+    use std::ops::ControlFlow;
+
+    /// Ends the waits of those who wait now.
+    fn time_passes<T>(turn: &Turn<T>) {
+        turn.left.notify_all();
+    }
+
+    #[test]
+    fn each_call_has_the_value_for_itself_and_gets_its_turn() {
+        loom::model(|| {
+            let turn = Arc::new(Turn::new(0));
+            let others = [0; 2].map(|_| {
+                let turn = Arc::clone(&turn);
+                thread::spawn(move || *turn.take(&mut keep_waiting()).unwrap() += 1)
+            });
+            *turn.take(&mut keep_waiting()).unwrap() += 1;
+            for other in others {
+                other.join().unwrap();
+            }
+            assert_eq!(turn.look(|value| *value), Some(3));
+        });
+    }
+
+    #[test]
+    fn a_wait_that_is_interrupted_takes_nobody_his_turn() {
+        loom::model(|| {
+            let turn = Arc::new(Turn::new(0));
+            let held = turn.take(&mut keep_waiting()).unwrap();
+            let patient = thread::spawn({
+                let turn = Arc::clone(&turn);
+                move || *turn.take(&mut keep_waiting()).unwrap() += 1
+            });
+            let interrupted = thread::spawn({
+                let turn = Arc::clone(&turn);
+                // it has its turn where the value comes before it looks at the hook
+                move || match turn.take(&mut || ControlFlow::Break(())) {
+                    Ok(_) | Err(ProtocolError::Interrupted) => {}
+                    Err(error) => panic!("{error:?}"),
+                }
+            });
+            time_passes(&turn);
+            drop(held);
+            patient.join().unwrap();
+            interrupted.join().unwrap();
+            assert_eq!(turn.look(|value| *value), Some(1));
+        });
+    }
+
+    #[test]
+    fn a_call_inside_a_call_is_refused_while_others_wait() {
+        loom::model(|| {
+            let turn = Arc::new(Turn::new(()));
+            let held = turn.take(&mut keep_waiting()).unwrap();
+            let other = thread::spawn({
+                let turn = Arc::clone(&turn);
+                move || turn.take(&mut keep_waiting()).map(|_| ())
+            });
+            let inside = turn.take(&mut keep_waiting()).map(|_| ());
+            assert!(matches!(inside, Err(ProtocolError::CallInProgress)));
+            drop(held);
+            other.join().unwrap().unwrap();
         });
     }
 }
