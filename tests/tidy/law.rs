@@ -1,7 +1,7 @@
 //! Which package has which door, and where `unsafe` may stand.
 
 /// The doors of each heavy package: one, and that of a simulation.
-pub const DOORS: [(&str, &str); 26] = [
+pub const DOORS: [(&str, &str); 30] = [
     ("ash", "sim-core/device/src/vulkan"),
     ("naga", "sim-core/device/src/shader/module.rs"),
     ("wgpu", "sim-core/device/src"),
@@ -28,6 +28,10 @@ pub const DOORS: [(&str, &str); 26] = [
     ("png", "sim-daemon/src/inspect/picture"),
     ("pyo3", "py-client/src"),
     ("numpy", "py-client/src"),
+    ("hyper", "sim-daemon/src/top/http.rs"),
+    ("hyper_util", "sim-daemon/src/top/http.rs"),
+    ("http_body_util", "sim-daemon/src/top/http.rs"),
+    ("tokio", "sim-daemon/src/top/http.rs"),
 ];
 
 /// Where `unsafe` may stand, and why.

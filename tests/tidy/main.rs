@@ -1,5 +1,6 @@
 //! The house rules of ARCHITECTURE.md and STYLE.md that a machine can check.
 
+mod doors;
 mod law;
 mod length;
 mod order;

@@ -4,14 +4,6 @@ pub mod iceoryx2 {
     pub use crate::surroundings::sample;
 }
 
-pub mod thread {
-    pub use loom::thread::{ThreadId, current, spawn};
-
-    pub fn this() -> ThreadId {
-        current().id()
-    }
-}
-
 pub mod sync {
     use std::sync::{LockResult, OnceLock, TryLockResult};
 
@@ -200,7 +192,11 @@ pub mod mpsc {
 pub mod thread {
     use std::time::Duration;
 
-    pub use loom::thread::{Builder, spawn};
+    pub use loom::thread::{Builder, ThreadId, spawn};
+
+    pub fn this() -> ThreadId {
+        loom::thread::current().id()
+    }
 
     /// Lets others run, and time pass.
     pub fn sleep(time: Duration) {

@@ -90,13 +90,15 @@ def test_a_life_that_fails_leaves_nothing_and_the_next_one_succeeds(life: Life, 
     for failpoint in chosen[::every]:
         done = life.run(failpoint)
         said = f"{failpoint}: {done.err}"
-        assert "panicked" not in done.err, said
+        is_removal = done.failed is not None and done.failed.name in REMOVALS
+        # the transport panics over a socket that it cannot remove, which ends nothing
+        assert is_removal or "panicked" not in done.err, said
         if done.code != 0:
             last = done.err.splitlines()[-1]
             places = (str(life.root), str(SHARED))
             # errno 24 names the limit of open files
             assert any(place in last for place in places) or "ulimit -n" in last, said
-        if done.failed is None or done.failed.name not in REMOVALS:
+        if not is_removal:
             assert not life.left(), said
         after = life.run()
         assert after.code == 0 and not life.left(), f"{said}\nafter it: {after.err}"

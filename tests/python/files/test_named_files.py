@@ -14,6 +14,7 @@ import pytest
 
 import tightloop as tl
 from processes import started
+from tightloop.mujoco import saved
 
 COMMAND = [sys.executable, "-m", "tightloop"]
 # Nothing here takes long; this only ends a test in which somebody waits for ever [s]
@@ -56,6 +57,7 @@ def test_what_is_no_file_is_refused_by_name_and_not_waited_for(tmp_path, pipe, n
         (lambda: tl.Scene().add_urdf(path), tl.UrdfError),
         (lambda: tl.Scene().add_mujoco(path), tl.SceneError),
         (lambda: tl.Scene().add_hfield(path, size=(1, 1), base=1), tl.SceneError),
+        (lambda: saved.read(path, ["body_parentid"]), tl.SceneError),
     ]
     for read, error in readers:
         with pytest.raises(error, match=r"not a file|no file|Is a directory") as caught:

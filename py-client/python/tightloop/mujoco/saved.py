@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.errors import SceneError
+from tightloop.files import named as named_files
 from tightloop.mujoco.texts import texts
 
+# as sim-model's reader of these files, and as safetensors [bytes]
+_FILE_MAX, _HEADER_MAX = 1 << 31, 100_000_000
 _TYPES = {"F64": np.float64, "I32": np.int32, "U8": np.uint8}
 
 
@@ -29,8 +32,10 @@ def read(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, NDArra
     """
     found = {}
     try:
-        with Path(path).open("rb") as file:
+        with named_files.opened("an exported model", Path(path), SceneError, limit=_FILE_MAX) as file:
             length = int.from_bytes(file.read(8), "little")
+            if length > _HEADER_MAX:
+                raise ValueError(f"a header of {length} bytes")
             header = json.loads(file.read(length))
             for name in names:
                 if name in header:
@@ -38,6 +43,8 @@ def read(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, NDArra
                     first, end = entry["data_offsets"]
                     file.seek(8 + length + first)
                     found[name] = np.frombuffer(file.read(end - first), _TYPES[entry["dtype"]]).reshape(entry["shape"])
+    except SceneError:
+        raise
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SceneError(f"{os.fspath(path)}: is no exported model; save the scene again: {error}") from error
     return found
