@@ -34,7 +34,9 @@ pub enum Dtype {
 }
 
 #[derive(Debug, Default)]
-pub struct FrameHeader;
+pub struct FrameHeader {
+    pub frame: u64,
+}
 
 #[derive(Debug)]
 pub struct Line;
@@ -85,7 +87,7 @@ pub mod sample {
     #[derive(Debug)]
     pub struct Sample<S, P: ?Sized, H> {
         pub slot: Arc<UnsafeCell<u32>>,
-        pub kind: PhantomData<(S, H, fn(&P))>,
+        pub kind: PhantomData<(S, H, Box<P>)>,
     }
 
     impl<S, P: ?Sized, H> Drop for Sample<S, P, H> {
