@@ -141,10 +141,7 @@ impl Client {
     /// [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::Forked`].
     pub fn controller(&self, hook: Hook<'_>) -> Result<Option<u32>, ProtocolError> {
         self.check_process()?;
-        match self.connection.ask(&Request::Controller, hook)? {
-            Response::Controller { pid } => Ok(pid),
-            _ => Err(malformed("the answer to controller")),
-        }
+        self.connection.holder(hook)
     }
 
     /// Whether this client holds the lease, as far as it knows. In a forked child it does not.

@@ -93,7 +93,7 @@ impl Controller {
         let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
         loop {
             let error = match ask_for_lease(connection, hook) {
-                Ok(epoch) => match open_lease(connection, description, frames, epoch) {
+                Ok(epoch) => match open_lease(connection, description, frames, epoch, hook) {
                     Ok(controller) => return Ok(controller),
                     Err(error) => error,
                 },
@@ -102,7 +102,7 @@ impl Controller {
             // a daemon that is short of time takes a lease back whose ports it did not see in time, and cleans up after a
             // dead holder late
             let again = match error {
-                ProtocolError::Transport { .. } => true,
+                ProtocolError::Transport { .. } | ProtocolError::LeaseLost { .. } => true,
                 ProtocolError::LeaseHeld { pid, .. } => {
                     process::is_gone(pid, connection.peer.beacon.pid)
                         || was_abandoned && pid == own_pid && start.elapsed() < ABANDONED_MAX
@@ -338,6 +338,7 @@ fn open_lease(
     description: &Arc<Description>,
     frames: &Arc<Alive>,
     epoch: u64,
+    hook: Hook<'_>,
 ) -> Result<Controller, ProtocolError> {
     let bytes = command_bytes(description);
     let ports = connection.with_node(|node| {
@@ -354,13 +355,12 @@ fn open_lease(
         connection.post(&Request::Release { epoch });
         connection.peer.check()?;
     }
-    Ok(Controller::new(
-        connection,
-        description,
-        frames,
-        epoch,
-        ports?,
-    ))
+    let controller = Controller::new(connection, description, frames, epoch, ports?);
+    // the daemon has seen the ports now, unless it took the lease back while they were opened
+    match connection.holder(hook)? == Some(crate::doors::process::id()) {
+        true => Ok(controller),
+        false => Err(connection.peer.lease_lost()),
+    }
 }
 
 impl Drop for Controller {

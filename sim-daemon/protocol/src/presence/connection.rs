@@ -223,6 +223,14 @@ impl Connection {
         Ok(())
     }
 
+    /// The process that holds the lease, if any.
+    pub(crate) fn holder(&self, hook: Hook<'_>) -> Result<Option<u32>, ProtocolError> {
+        match self.ask(&Request::Controller, hook)? {
+            Response::Controller { pid } => Ok(pid),
+            _ => Err(malformed("the answer to controller")),
+        }
+    }
+
     /// Says that we are alive, unless a request that is waited for shows it: too many that are unread would push it out.
     pub(crate) fn beat(&self, epoch: u64) {
         if self.asking.look(|()| ()).is_some() {
