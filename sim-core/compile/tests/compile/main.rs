@@ -1,129 +1,21 @@
 //! Programs of machine code beside the interpreter of recordings: every bit, in every lane.
 
+mod beside;
 mod listing;
 mod random_code;
 
+use beside::{Line, addresses, assert_same, compiled, outputs, tables, targets};
 use random_code::{INPUTS, Random, code, run};
-use sim_compile::{Address, CompileError, Places, Program, Target};
-use sim_physics::lane::simd::widths;
-use sim_physics::lane::{Cx, Fixed, Num, Table, Tables};
+use sim_compile::{Address, Places, Program, Target};
+use sim_physics::lane::{Cx, Fixed, Num, Table};
 use sim_physics::{times, when};
 use sim_record::{Recorded, Recorder, Recording, record};
-
-/// Numbers of the outputs' array before a program writes them.
-const BEFORE: f32 = -77.0;
-
-/// The targets that this processor runs, with their worlds in a block.
-fn targets() -> Vec<(Target, usize)> {
-    let widths = widths();
-    let all = [
-        (
-            Target::Avx2,
-            8,
-            widths.eight && cfg!(target_arch = "x86_64"),
-        ),
-        (Target::Avx512, 16, widths.sixteen),
-    ];
-    let here = all.into_iter().filter(|(.., runs)| *runs);
-    here.map(|(target, width, _)| (target, width)).collect()
-}
-
-/// So many registers of an array, from the first on.
-fn addresses(array: u32, n: usize) -> Vec<Address> {
-    let each = (0..n as u32).map(|at| Address { array, at });
-    each.collect()
-}
-
-fn compiled(recording: &Recording, target: Target) -> Result<Program, CompileError> {
-    let places = Places {
-        inputs: &addresses(0, recording.inputs()),
-        outputs: &addresses(1, recording.outputs()),
-        memory: Some(2),
-    };
-    Program::new(recording, &places, &tables(), target)
-}
-
-fn tables() -> Tables<f32> {
-    Tables {
-        numbers: vec![0.5, -2.0, 3.0, 0.25],
-        indices: Vec::new(),
-    }
-}
-
-/// Aligned memory.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Line([f32; 16]);
-
-/// Runs a program; `worlds` are as many as a block has. Outputs of each world, or none where the program refuses.
-fn outputs(
-    program: &Program,
-    recording: &Recording,
-    width: usize,
-    worlds: &[Vec<f32>],
-) -> Option<Vec<Vec<f32>>> {
-    assert_eq!(worlds.len(), width);
-    let lines = |registers: usize| (registers * width).div_ceil(16) + 1;
-    let mut inputs = vec![Line([0.0; 16]); lines(recording.inputs())];
-    let mut results = vec![Line([BEFORE; 16]); lines(recording.outputs())];
-    let mut scratch = vec![Line([f32::NAN; 16]); lines(program.scratch())];
-    let mut memory = vec![Line([BEFORE; 16]); lines(recording.scratch())];
-    for (lane, world) in worlds.iter().enumerate() {
-        for (k, x) in world.iter().enumerate() {
-            let place = k * width + lane;
-            inputs[place / 16].0[place % 16] = *x;
-        }
-    }
-    let arrays = [&mut inputs, &mut results, &mut memory].map(|lines| lines.as_mut_ptr().cast());
-    // SAFETY: the arrays have the registers of inputs and outputs, and `targets` are those that this processor has.
-    let done = unsafe { program.run(&arrays, scratch.as_mut_ptr().cast()) };
-    let result = |lane: usize, k: usize| {
-        let place = k * width + lane;
-        results[place / 16].0[place % 16]
-    };
-    if !done {
-        let registers = 0..recording.outputs();
-        assert!(
-            registers
-                .clone()
-                .all(|k| (0..width).all(|lane| result(lane, k) == BEFORE))
-        );
-        return None;
-    }
-    let of_lane = |lane| (0..recording.outputs()).map(|k| result(lane, k)).collect();
-    Some((0..width).map(of_lane).collect())
-}
-
-/// Compares a program with the interpreter, in random worlds; returns how many values left the registers.
-#[track_caller]
-fn assert_same(recording: &Recording, random: &mut Random, what: &str) -> usize {
-    let mut spills = 0;
-    for (target, width) in targets() {
-        let program = compiled(recording, target).unwrap_or_else(|e| panic!("{what}: {e}"));
-        spills += program.size().spills;
-        let worlds: Vec<Vec<f32>> = (0..width)
-            .map(|_| random.numbers(recording.inputs()))
-            .collect();
-        let results = outputs(&program, recording, width, &worlds).expect("it assumes nothing");
-        for (lane, (world, result)) in worlds.iter().zip(&results).enumerate() {
-            let mut memory = vec![BEFORE; recording.scratch()];
-            let expected = recording.evaluate(world, &mut memory, &tables());
-            let bits = |x: &[f32]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-            assert_eq!(
-                bits(result),
-                bits(&expected),
-                "{what}, {target:?}, lane {lane}: {result:?}, not {expected:?}"
-            );
-        }
-    }
-    spills
-}
 
 #[test]
 fn random_programs_have_the_bits_of_the_interpreter() {
     let (mut loops, mut spills) = (0, 0);
     for seed in 0..2000 {
-        let mut random = Random(seed);
+        let mut random = Random::seeded(seed);
         let steps = code(&mut random, 2, 3, 14);
         let recording = record(INPUTS, |cx, inputs| run(cx, &steps, inputs)).expect("it is right");
         loops += recording.statements().loops;
@@ -150,7 +42,11 @@ fn more_values_than_registers_come_back() {
         };
         (0..7).map(sum).collect()
     });
-    let spills = assert_same(&recording.unwrap(), &mut Random(1), "sums of products");
+    let spills = assert_same(
+        &recording.unwrap(),
+        &mut Random::seeded(1),
+        "sums of products",
+    );
     assert!(spills > 50 || targets().is_empty(), "{spills}");
 }
 
@@ -176,7 +72,7 @@ fn values_from_before_a_loop_are_there_in_every_iteration() {
         });
         vec![cx.get(&sum), cx.get(&last), before[0], before[39]]
     });
-    assert_same(&recording.unwrap(), &mut Random(2), "two loops");
+    assert_same(&recording.unwrap(), &mut Random::seeded(2), "two loops");
 }
 
 #[test]
@@ -208,7 +104,7 @@ fn scratch_memory_keeps_what_was_written_where_the_world_was_active() {
     });
     let recording = recording.unwrap();
     for seed in 0..20 {
-        assert_same(&recording, &mut Random(seed), "a table");
+        assert_same(&recording, &mut Random::seeded(seed), "a table");
     }
 }
 
@@ -361,7 +257,7 @@ fn more_masks_than_registers_come_back() {
         };
         (0..5).map(choice).collect()
     });
-    let spills = assert_same(&recording.unwrap(), &mut Random(4), "masks");
+    let spills = assert_same(&recording.unwrap(), &mut Random::seeded(4), "masks");
     assert!(spills > 10 || targets().is_empty(), "{spills}");
 }
 
@@ -412,7 +308,7 @@ fn tables_of_the_model_are_folded_in_and_other_reads_of_them_are_refused_by_name
         let row = cx.at(1);
         vec![x[0] * cx.constant(table, row, 1)]
     });
-    assert_same(&known.unwrap(), &mut Random(3), "a known row");
+    assert_same(&known.unwrap(), &mut Random::seeded(3), "a known row");
     let picked = record(1, |cx, x| vec![cx.pick(table, x[0], 0)]).unwrap();
     let error = compiled(&picked, Target::Avx2).unwrap_err();
     if cfg!(target_arch = "x86_64") {

@@ -6,20 +6,42 @@ use sim_physics::{break_if, when};
 pub const INPUTS: usize = 6;
 const VARIABLES: usize = 5;
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
-pub struct Random(pub u64);
+/// Choices by SplitMix64 (Steele, Lea and Flood 2014), or by given bytes: one that is missing is the middle of its range.
+pub struct Random<'a> {
+    choices: Option<&'a [u8]>,
+    state: u64,
+}
 
-impl Random {
+impl Random<'_> {
+    pub fn seeded(seed: u64) -> Random<'static> {
+        let (choices, state) = (None, seed);
+        Random { choices, state }
+    }
+
+    /// A byte makes a choice: what is changed in one place of the bytes changes one place of the code.
+    #[allow(dead_code)] // a fuzz target calls it
+    pub fn chosen(choices: &[u8]) -> Random<'_> {
+        Random {
+            choices: Some(choices),
+            state: 1,
+        }
+    }
+
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
 
     fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
+        match &mut self.choices {
+            Some(choices) => choices
+                .split_off_first()
+                .map_or(n / 2, |&choice| usize::from(choice) % n),
+            None => (self.bits() % n as u64) as usize,
+        }
     }
 
     /// Numbers in [-2, 2), some 0 or 1.
@@ -49,7 +71,7 @@ pub enum Step {
     Times(usize, Vec<Step>, Option<Formula>, Vec<Step>),
 }
 
-fn formula(random: &mut Random) -> Formula {
+fn formula(random: &mut Random<'_>) -> Formula {
     let constant = [0.0, 1.0, -1.0, 0.5, 2.0, 1.375][random.below(6)];
     Formula {
         kind: random.below(22),
@@ -59,8 +81,8 @@ fn formula(random: &mut Random) -> Formula {
 }
 
 /// Code with blocks inside each other; so many more loops and blocks may be opened.
-pub fn code(random: &mut Random, loops: usize, blocks: usize, length: usize) -> Vec<Step> {
-    let step = |random: &mut Random| match random.below(16) {
+pub fn code(random: &mut Random<'_>, loops: usize, blocks: usize, length: usize) -> Vec<Step> {
+    let step = |random: &mut Random<'_>| match random.below(16) {
         0 | 1 if blocks > 0 => {
             let mask = formula(random);
             Step::When(mask, code(random, loops, blocks - 1, length * 2 / 3))
