@@ -227,6 +227,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "journal",
             "client",
             "host",
+            "outside",
         ],
     ),
     (
@@ -316,6 +317,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "compile",
             "bench",
             "commands",
+            "outside",
         ],
     ),
     (

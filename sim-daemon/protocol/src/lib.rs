@@ -35,6 +35,8 @@ pub mod host;
 pub mod journal;
 mod lease;
 mod memory;
+#[doc(hidden)] // for tests, which give it any bytes
+pub mod outside;
 mod presence;
 mod transport;
 mod waiting;

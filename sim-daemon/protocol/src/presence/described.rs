@@ -44,10 +44,16 @@ pub(crate) fn read(paths: &DaemonPaths, session: u64) -> Result<Description, Pro
             .read_to_end(&mut text)
             .map_err(failed)?;
     }
-    serde_json::from_slice(&text).map_err(|_| ProtocolError::Damaged {
+    parse(&text).ok_or_else(|| ProtocolError::Damaged {
         action: "read the description".to_owned(),
         path: path.display().to_string(),
     })
+}
+
+/// A description from its JSON; none where it is damaged, or its counts and ranges do not fit each other.
+pub(crate) fn parse(text: &[u8]) -> Option<Description> {
+    let description: Description = serde_json::from_slice(text).ok()?;
+    description.is_consistent().then_some(description)
 }
 
 /// What of shared memory another program has changed.

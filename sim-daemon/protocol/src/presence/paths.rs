@@ -28,6 +28,8 @@ use crate::wire::hash::Fnv;
 pub const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 /// What this process uses as the value of [`RUNTIME_FOLDER`] where that is unset.
 static STAND_IN: OnceLock<PathBuf> = OnceLock::new();
+/// Most groups that a lock file may tell of: programs ask each of them. A daemon serves 64.
+const GROUPS_MAX: usize = 1024;
 /// How often a folder is made again that others remove meanwhile.
 const TRIES: usize = 1000;
 
@@ -318,12 +320,17 @@ pub(crate) const STARTING: &str = "tightloop starting\n";
 fn read_beacon(file: &File) -> std::io::Result<Presence> {
     let mut bytes = [0; 128];
     let read = files::read_at(file, &mut bytes, 0)?;
-    Ok(match str::from_utf8(&bytes[..read]).ok() {
+    Ok(presence_of(&bytes[..read]))
+}
+
+/// What the bytes of a lock file say of its holder.
+pub(crate) fn presence_of(bytes: &[u8]) -> Presence {
+    match str::from_utf8(bytes).ok() {
         Some(STARTING) => Presence::Starting,
         text => text
             .and_then(parse_beacon)
             .map_or(Presence::Silent, Presence::Running),
-    })
+    }
 }
 
 fn parse_beacon(text: &str) -> Option<Beacon> {
@@ -333,11 +340,12 @@ fn parse_beacon(text: &str) -> Option<Beacon> {
     else {
         return None;
     };
-    Some(Beacon {
+    let groups = words.next().map_or(Some(1), |word| word.parse().ok())?;
+    (1..=GROUPS_MAX).contains(&groups).then_some(Beacon {
         protocol: protocol.parse().ok()?,
         pid: pid.parse().ok()?,
         session: u64::from_str_radix(session, 16).ok()?,
-        groups: words.next().map_or(Some(1), |word| word.parse().ok())?,
+        groups,
     })
 }
 
@@ -378,6 +386,24 @@ fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_line_of_no_groups_or_of_more_than_anybody_serves_is_no_daemon() {
+        let presence = |groups: &str| {
+            let line = format!("tightloop 5 7 00000000deadbeef{groups}\n");
+            presence_of(line.as_bytes())
+        };
+        assert!(matches!(presence(""), Presence::Running(beacon) if beacon.groups == 1));
+        assert!(matches!(presence(" 64"), Presence::Running(beacon) if beacon.groups == 64));
+        for groups in [
+            " 0",
+            " 1025",
+            " 18446744073709551615",
+            " 99999999999999999999",
+        ] {
+            assert_eq!(presence(groups), Presence::Silent, "{groups}");
+        }
+    }
 
     #[test]
     fn names_with_slashes_dots_or_nothing_are_refused() {

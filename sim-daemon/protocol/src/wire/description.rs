@@ -268,6 +268,9 @@ pub struct InputInfo {
     pub doc: String,
 }
 
+/// Most entries of an array, and most worlds: beyond any memory, and still a number of bytes.
+const ENTRIES_MAX: usize = 1 << 48;
+
 /// Axes whose entries have names, in the order of [`Description::schema_hash`].
 const NAMED_AXES: [&str; 10] = [
     "dofs",
@@ -353,7 +356,37 @@ impl Description {
 
     /// Threads that steps keep busy: one world cannot use more than one.
     pub fn busy_threads(&self) -> usize {
-        self.threads.min(self.worlds * self.groups).max(1)
+        self.threads
+            .min(self.worlds.saturating_mul(self.groups))
+            .max(1)
+    }
+
+    /// Whether counts and ranges fit each other, so that what is computed of them neither overflows nor leaves its list.
+    pub(crate) fn is_consistent(&self) -> bool {
+        let entries = |inputs: &[InputInfo]| {
+            let mut columns = inputs.iter().map(|input| input.columns);
+            let columns = columns.try_fold(0usize, usize::checked_add)?;
+            columns.checked_mul(self.worlds)
+        };
+        let of_field = |field: &FieldInfo| {
+            let mut shape = field.shape.iter();
+            shape.try_fold(1usize, |all, &n| all.checked_mul(n))
+        };
+        let sizes = [&self.commands, &self.writes].map(|inputs| entries(inputs));
+        let fields = self.fields.iter().chain(&self.known_fields).map(of_field);
+        let all_worlds = self.worlds.checked_mul(self.groups);
+        let last_world = all_worlds.and_then(|worlds| worlds.checked_add(self.first_world));
+        let mut sizes = sizes.into_iter().chain(fields).chain([last_world]);
+        let are_there = |robot: &RobotRange| {
+            NAMED_AXES.iter().all(|axis| {
+                let (range, names) = (robot.columns(axis), self.names(axis));
+                range
+                    .zip(names)
+                    .is_none_or(|([start, stop], names)| start <= stop && stop <= names.len())
+            })
+        };
+        sizes.all(|size| size.is_some_and(|size| size <= ENTRIES_MAX))
+            && self.robots.iter().all(are_there)
     }
 }
 
