@@ -32,6 +32,14 @@ pub(super) struct Meshes<'a> {
 /// Reads the polygons around the hull of each mesh.
 fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelError> {
     let beyond = || file.fault("has polygons that are not there".to_owned());
+    // each is of one mesh, and a corner of one polygon: shared ones could stand for more than any memory
+    let is_shared = |counts: &[i64], all: usize| {
+        let counts = counts
+            .iter()
+            .filter_map(|&count| usize::try_from(count).ok());
+        counts.fold(0, usize::saturating_add) > all
+    };
+    let shared = || file.fault("has polygons or corners that meshes share".to_owned());
     let parts = |first: i64, count: i64| {
         let first = usize::try_from(first).ok()?;
         Some(first..first.checked_add(usize::try_from(count).ok()?)?)
@@ -47,6 +55,9 @@ fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelEr
     }
     let firsts = file.integers_or("mesh_polyvertadr", rows, 0)?;
     let counts = file.integers_or("mesh_polyvertnum", rows, 0)?;
+    if is_shared(&counts, corners.len()) {
+        return Err(shared());
+    }
     let mut all = Vec::with_capacity(rows);
     for (polygon, (&first, &count)) in firsts.iter().zip(&counts).enumerate() {
         let listed = parts(first, count).and_then(|part| corners.get(part));
@@ -63,6 +74,9 @@ fn polygons(file: &ModelFile, count: usize) -> Result<Vec<Vec<Polygon>>, ModelEr
     }
     let firsts = file.integers_or("mesh_polyadr", count, 0)?;
     let counts = file.integers_or("mesh_polynum", count, 0)?;
+    if is_shared(&counts, all.len()) {
+        return Err(shared());
+    }
     let of_meshes = firsts.into_iter().zip(counts);
     let of_meshes = of_meshes.map(|(first, count)| Some(all.get(parts(first, count)?)?.to_vec()));
     of_meshes.collect::<Option<_>>().ok_or_else(beyond)
@@ -207,5 +221,56 @@ impl<'a> Meshes<'a> {
             mesh.hulls = mesh.hulls.into_iter().map(as_mujocos).collect();
         }
         Ok(Shape::Mesh(Arc::new(mesh)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::{Dtype, serialize, tensor::TensorView};
+
+    /// The polygons of so many meshes in a file with triangles of corners 0, 1 and 2, whose numbers begin at `firsts`; each mesh
+    /// has one triangle from the first on.
+    fn read(firsts: &[i32], meshes: usize) -> Result<Vec<Vec<Polygon>>, ModelError> {
+        let bytes = |numbers: &[i32]| -> Vec<u8> {
+            let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
+            numbers.collect()
+        };
+        let rows = firsts.len();
+        let normals = vec![0; 24 * rows];
+        let columns = [
+            ("format", vec![1]),
+            ("mesh_polyvert", vec![0, 1, 2]),
+            ("mesh_polyvertadr", firsts.to_vec()),
+            ("mesh_polyvertnum", vec![3; rows]),
+            ("mesh_polyadr", vec![0; meshes]),
+            ("mesh_polynum", vec![1; meshes]),
+        ];
+        let columns = columns.map(|(name, numbers)| (name, numbers.len(), bytes(&numbers)));
+        let mut views: Vec<_> = columns
+            .iter()
+            .map(|(name, count, data)| {
+                let view = TensorView::new(Dtype::I32, vec![*count], data);
+                (*name, view.unwrap())
+            })
+            .collect();
+        let normals = TensorView::new(Dtype::F64, vec![rows, 3], &normals).unwrap();
+        views.push(("mesh_polynormal", normals));
+        let name = format!("tightloop-polygons-{}-{rows}-{meshes}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, serialize(views, None).unwrap()).unwrap();
+        let file = ModelFile::read(&path);
+        std::fs::remove_file(&path).unwrap();
+        polygons(&file.unwrap(), meshes)
+    }
+
+    #[test]
+    fn polygons_and_corners_that_are_shared_are_refused() {
+        let whole = read(&[0], 1).unwrap();
+        assert_eq!(whole[0][0].corners, [0, 1, 2]);
+        for (firsts, meshes) in [(&[0][..], 2), (&[0, 0][..], 1)] {
+            let message = read(firsts, meshes).unwrap_err().to_string();
+            assert!(message.contains("that meshes share"), "{message}");
+        }
     }
 }

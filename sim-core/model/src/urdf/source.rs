@@ -161,7 +161,8 @@ pub(super) fn prepare<'a>(
     let mut edits = markup.blank;
     if !declarations.is_empty() {
         edits.push(markup.root_name_end..markup.root_name_end);
-        edits.sort_by_key(|range| range.start);
+        // the name of a broken tag may end where an XML declaration begins: that one comes after what is added
+        edits.sort_by_key(|range| (range.start, range.end));
     }
     if edits.is_empty() {
         return Ok(Cow::Borrowed(text));

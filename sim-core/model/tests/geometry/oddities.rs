@@ -1,7 +1,9 @@
 //! Mesh files that exporters and converters spoil: read as they are meant where that is certain, and refused where a part
 //! of the surface would be lost in silence.
 
-use sim_model::geometry::Mesh;
+use std::time::{Duration, Instant};
+
+use sim_model::geometry::{Mesh, VisualMesh};
 
 use crate::files::{
     Folder, PLAIN, brick, dae, glb, gltf, gltf_buffer, mapped, obj, refusal, stl, stl_text,
@@ -277,4 +279,27 @@ fn a_buffer_of_gltf_may_have_a_blank_in_its_name() {
     }
     let outside = gltf(&y_up, "\"uri\":\"%2e%2e/a.bin\",", r#"{"mesh":0}"#);
     assert_refused("outside.gltf", outside, "is not a file beside it");
+}
+
+#[test]
+fn a_file_of_materials_that_many_lines_name_is_read_once() {
+    let folder = Folder::new("libraries");
+    folder.put("a.mtl", "newmtl a\nKd 1 0 0\n".repeat(20_000));
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    // the second loop names a file anew in each line
+    let same = "mtllib a.mtl\n".repeat(20_000);
+    let other: String = (0..20_000)
+        .map(|k| format!("mtllib {}a.mtl\n", "./".repeat(1 + k % 200)))
+        .collect();
+    for lines in [same, other] {
+        let path = folder.put("a.obj", format!("{lines}{triangle}"));
+        let start = Instant::now();
+        let mesh = VisualMesh::load(&path, false).unwrap();
+        assert!(
+            start.elapsed() < Duration::from_secs(5),
+            "{:?}",
+            start.elapsed()
+        );
+        assert_eq!(mesh.colors, [Some([255, 0, 0, 255])]);
+    }
 }

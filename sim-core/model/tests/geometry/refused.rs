@@ -238,6 +238,12 @@ fn broken_gltf_is_refused() {
     assert_refused("nine.glb", glb(&nine, &buffer), &["shorter than it tells"]);
     let view = json.replace("\"byteOffset\":96", "\"byteOffset\":200");
     assert_refused("view.glb", glb(&view, &buffer), &["shorter than it tells"]);
+    let positions = json.replace("\"POSITION\":0", "\"POSITION\":2");
+    assert_refused(
+        "positions.glb",
+        glb(&positions, &buffer),
+        &["positions in accessor 2, and there are 2"],
+    );
     let mut index = buffer.clone();
     index[96..100].copy_from_slice(&8_u32.to_le_bytes());
     assert_refused("index.glb", glb(&json, &index), &["an index is 8"]);

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
+use gltf::json::validation::Checked;
 use gltf::mesh::{Mode, Semantic};
 use gltf::scene::Transform;
 use gltf::{Document, Gltf, Node};
@@ -27,16 +28,15 @@ const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let bytes = unmarked(bytes)?;
-    let Gltf { document, blob } = Gltf::from_slice(bytes).map_err(|error| {
-        // the check of the whole file would call an extension that is not read an error of the file
-        match Gltf::from_slice_without_validation(bytes).map(|gltf| needed(&gltf.document)) {
-            Ok(Some(needed)) => needed,
-            _ => format!("is not glTF 2.0: {error}; export it again"),
-        }
-    })?;
+    let broken = |error: gltf::Error| format!("is not glTF 2.0: {error}; export it again");
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(broken)?;
+    // the check of the whole file would call an extension that is not read an error of the file
     if let Some(needed) = needed(&document) {
         return Err(needed);
     }
+    let document = document.into_json();
+    check_positions(&document)?;
+    let document = Document::from_json(document).map_err(broken)?;
     if document
         .extensions_used()
         .any(|extension| extension == INSTANCING)
@@ -64,6 +64,20 @@ fn needed(document: &Document) -> Option<String> {
     Some(format!(
         "it needs the extension {extension}; export it without"
     ))
+}
+
+/// Refuses positions that are not there: the check of the whole file relies on them.
+fn check_positions(document: &gltf::json::Root) -> Result<(), String> {
+    let primitives = document.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let positions = Checked::Valid(Semantic::Positions);
+    let mut places = primitives.filter_map(|primitive| primitive.attributes.get(&positions));
+    let count = document.accessors.len();
+    match places.find(|place| place.value() >= count) {
+        Some(place) => Err(format!(
+            "a mesh has its positions in accessor {place}, and there are {count}; export it again"
+        )),
+        None => Ok(()),
+    }
 }
 
 struct Scene<'a> {

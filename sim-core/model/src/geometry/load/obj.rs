@@ -1,7 +1,7 @@
 //! Wavefront OBJ: the vertices and faces of all its objects and groups, with the materials of its MTL files; normals play no
 //! part.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::color::{color_of, mean};
@@ -9,6 +9,9 @@ use super::mtl;
 use super::raw::fan;
 use super::text::{lines, text_of};
 use super::{Limits, Material, RawMesh, Run};
+
+/// Most files of materials that a mesh names: exporters write one or two.
+const LIBRARIES_MAX: usize = 16;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let text = text_of(bytes)?;
@@ -93,6 +96,8 @@ fn vertex(word: &str, known: usize) -> Option<u32> {
 struct Looks<'a> {
     folder: &'a Path,
     materials: HashMap<String, Material>,
+    /// Names of the files that were read: a line that repeats one reads nothing.
+    libraries: HashSet<String>,
     /// Texture coordinates, counted as vertices are.
     uv: Vec<[f32; 2]>,
     /// Colour of each vertex, where a line gives it.
@@ -107,6 +112,7 @@ impl Looks<'_> {
         Looks {
             folder,
             materials: HashMap::new(),
+            libraries: HashSet::new(),
             uv: Vec::new(),
             colors: Vec::new(),
             runs: Vec::new(),
@@ -132,7 +138,12 @@ impl Looks<'_> {
                     .push([next.next().unwrap_or(0.0), next.next().unwrap_or(0.0)]);
             }
             // names may hold spaces
-            "mtllib" => self.materials.extend(mtl::read(self.folder, rest())),
+            "mtllib"
+                if self.libraries.len() < LIBRARIES_MAX
+                    && self.libraries.insert(rest().to_owned()) =>
+            {
+                self.materials.extend(mtl::read(self.folder, rest()));
+            }
             "usemtl" => {
                 self.end_run(triangles);
                 self.run.material = self.materials.get(rest()).cloned().unwrap_or_default();
