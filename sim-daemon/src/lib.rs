@@ -17,6 +17,8 @@ mod inspect;
 mod list;
 pub mod observe;
 mod output;
+#[doc(hidden)] // for tests, which give it any bytes
+pub mod outside;
 mod perf_map;
 mod printer;
 mod recording;

@@ -95,3 +95,24 @@ impl<R: Read> Entries<R> {
         unreadable(&self.path, format!("is damaged: {what}; copy it again"))
     }
 }
+
+/// Reads all records of a recording, up to what was cut or is damaged; returns how many there are.
+///
+/// # Errors
+/// Bytes that are no recording; a block whose records make no sense.
+pub(crate) fn count_records(bytes: &[u8]) -> Result<u64, String> {
+    let mut entries = Entries {
+        path: PathBuf::new(),
+        bytes: bytes.len() as u64,
+        blocks: Blocks::open(bytes)?,
+        block: Vec::new(),
+        read: 0,
+    };
+    let mut count = 0;
+    loop {
+        match entries.next().map_err(|error| error.to_string())? {
+            Entry::Record(_) => count += 1,
+            Entry::End | Entry::Cut | Entry::Damaged => return Ok(count),
+        }
+    }
+}

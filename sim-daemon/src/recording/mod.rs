@@ -25,8 +25,10 @@ mod run;
 mod tests;
 mod writer;
 
+pub(crate) use entries::count_records;
 pub use playback::Playback;
 #[cfg(test)]
 pub(crate) use record::follow;
 pub(crate) use record::run as record;
 pub(crate) use replay::run as replay;
+pub(crate) use writer::file_of;

@@ -18,6 +18,14 @@ const QUEUE: usize = 256 << 20;
 /// … but not more, nor fewer, than these.
 const QUEUE_LENGTH: std::ops::RangeInclusive<usize> = 4..=256;
 
+/// A file with one block of these records.
+pub(crate) fn file_of(records: &[u64]) -> Vec<u8> {
+    let (mut bytes, mut block) = (blocks::head().to_vec(), Vec::new());
+    blocks::pack(records, &mut block);
+    bytes.extend(block);
+    bytes
+}
+
 /// The end that takes records.
 pub(super) struct Writer {
     block: Vec<u64>,

@@ -60,7 +60,11 @@ impl Ik {
         question.answer(&answer).map_err(refuse)
     }
 
-    fn solve(
+    /// The answer to a question.
+    ///
+    /// # Errors
+    /// One sentence about what does not fit.
+    pub(crate) fn solve(
         &mut self,
         simulation: &Simulation,
         question: &Exchange,

@@ -15,4 +15,7 @@ mod session;
 mod shown;
 mod watchdog;
 
+pub(crate) use exchange::Exchange;
+pub(crate) use ik::Ik;
+pub(crate) use rollout::check as check_rollout;
 pub(crate) use session::{read_scene, run};

@@ -14,4 +14,4 @@ mod observation;
 mod question;
 mod run;
 
-pub(crate) use run::Rollouts;
+pub(crate) use run::{Rollouts, check};

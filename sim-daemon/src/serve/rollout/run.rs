@@ -6,7 +6,7 @@ use sim_engine::simulation::{Precision, Simulation};
 use sim_physics::arrays::status;
 use sim_policy::Runner;
 use sim_protocol::host::{FrameMemory, Host, Worlds};
-use sim_protocol::{RefusalKind, Table};
+use sim_protocol::{Description, RefusalKind, Table};
 
 use super::answer::Answer;
 use super::commands::Commands;
@@ -128,6 +128,28 @@ impl Rollouts {
         result?;
         Ok(rollout.answer.finish(memory.values()))
     }
+}
+
+/// Checks a question as far as it needs no host.
+///
+/// # Errors
+/// One sentence about what does not fit.
+pub(crate) fn check(
+    question: &Exchange,
+    simulation: &Simulation,
+    description: &Description,
+) -> Result<(), String> {
+    let worlds = simulation.worlds();
+    let asked = Asked::parse(question, worlds)?;
+    let table = export::frame_table(simulation.layout());
+    let observation = Observation::<f32>::find(&asked, &table)?;
+    Commands::find(&asked, description)?;
+    let (terms, actions) = (&asked.question.terms, asked.network.outputs());
+    let places = Places::lay_out(terms, observation.sizes(), actions, worlds)?;
+    let others = places.bytes(worlds);
+    Answer::new(&asked, worlds, &table, others, snapshot::check_room)?;
+    Memory::new(places, worlds, asked.memory.clone())?;
+    Ok(())
 }
 
 /// The end of a rollout, for the client.
