@@ -17,6 +17,7 @@ ROUNDS ?= 200
 HOURS  ?= 1
 PATIENCE ?= 2
 TOOLCHAIN ?= nightly
+SECONDS ?= 60
 
 # The wheel, the tests and the lints build pyo3 with the same environment. With different ones each would rebuild it.
 export PYO3_PYTHON := $(CURDIR)/$(PYTHON)
@@ -40,7 +41,7 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz fuzz-bytes \
   failpoints miri asan tsan loom nightly nightly-processes nightly-inputs nightly-memory published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test test-all docs test-rl test-mjlab train bench-env coverage)
@@ -128,6 +129,10 @@ simulate: ## daemon, clients and observers on a simulated machine (MINUTES=30 SE
 # A failure prints its seed. Properties take about a minute for 100 cases of each.
 fuzz: ## random programs on random scenes (CASES=1000 SEED=5000)
 	TIGHTLOOP_CASES=$(CASES) TIGHTLOOP_SEED=$(SEED) cargo test --release --workspace --test interventions --test machine_code
+
+# Not part of `test`, in which tests/corpora.rs reads the seeds: it needs a nightly compiler. tests/fuzz/run.sh has the budgets.
+fuzz-bytes: ## random bytes for each reader of what comes from outside (SECONDS=60 TARGETS="urdf onnx")
+	tests/fuzz/run.sh $(SECONDS) $(TARGETS)
 
 # Not part of `test`, which lets few calls fail: each call of a daemon's life takes ten minutes for an error.
 failpoints: wheel $(VENV)/.dev ## let every system call of files and daemons fail, with each of its errors

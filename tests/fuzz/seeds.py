@@ -1,0 +1,529 @@
+"""Make the seeds of the fuzz targets: `python tests/fuzz/seeds.py`.
+
+Seeds are small inputs that reach far into a reader. Inputs that once broke one have names that begin with `fault_`, and
+stay as they are.
+"""
+
+import base64
+import json
+import struct
+from pathlib import Path
+
+FUZZ = Path(__file__).parent
+ROOT = FUZZ.parent.parent
+# words of a row of a field table, and bytes of a line
+ROW_WORDS, LINE = 12, 64
+# types of entries of an array: code and bytes
+F32, F64, U64, U8 = (1, 4), (2, 8), (5, 8), (6, 1)
+
+
+def write(target: str, name: str, data: bytes | str) -> None:
+    """Write a seed."""
+    folder = FUZZ / "corpus" / target
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+def lock_lines() -> None:
+    """Lines of lock files."""
+    write("beacon", "starting", "tightloop starting\n")
+    write("beacon", "alone", "tightloop 5 1234 00000000deadbeef\n")
+    write("beacon", "groups", "tightloop 5 1234 00000000deadbeef 4\n")
+
+
+def control() -> None:
+    """Requests and answers, one of each."""
+    percentiles = dict.fromkeys(("mean", "p50", "p99", "p999", "worst"), 1.5)
+    timing = dict.fromkeys(("frames", "missed", "late", "skipped"), 3)
+    timing |= dict.fromkeys(("period", "lateness", "latency", "busy"), percentiles)
+    messages = {
+        "describe": "Describe",
+        "acquire": {"Acquire": {"pid": 7}},
+        "release": {"Release": {"epoch": 1}},
+        "heartbeat": {"Heartbeat": {"epoch": 1}},
+        "device_memory": {"DeviceMemory": {"epoch": 1}},
+        "journal": {"Journal": {"observed": 5}},
+        "timing": {"Timing": {"clear": True}},
+        "shutdown": "Shutdown",
+        "controller_answer": {"Controller": {"pid": None}},
+        "held_answer": {"Held": {"pid": 9}},
+        "memory_answer": {"NoMemory": {"free": 1, "needed": 2}},
+        "journal_answer": {"Journal": {"journal": 3, "port": [1, 2]}},
+        "timing_answer": {"Timing": timing},
+        "refused_answer": {"Refused": {"reason": "no"}},
+    }
+    for name, message in messages.items():
+        write("control", name + ".json", json.dumps(message))
+
+
+def description() -> None:
+    """A daemon with four worlds of a cart-pole."""
+    dofs = ["cartpole/slider", "cartpole/hinge"]
+    field = {"name": "joint_q", "dtype": "f32", "shape": [4, 2], "unit": "m", "doc": "Positions."}
+    field["axes"] = "(worlds, coords)"
+    effort = {"name": "joint_f", "columns": 2, "unit": "N", "doc": "Forces."}
+    position = {"name": "joint_q", "columns": 2, "unit": "m", "doc": "Positions."}
+    robot = {"name": "cartpole", "dofs": [0, 2], "coords": [0, 2], "bodies": [0, 1], "actuators": [0, 0]}
+    robot["is_mujoco"] = False
+    key = {name: [0.0] for name in ("joint_q", "joint_qd", "act", "ctrl", "mocap_pos", "mocap_quat")}
+    daemon = {
+        "protocol": 5,
+        "release": "0.1.0",
+        "name": "cartpole",
+        "session": 1,
+        "pid": 2,
+        "worlds": 4,
+        "group": 0,
+        "groups": 1,
+        "first_world": 0,
+        "device": "cpu",
+        "adapter": "",
+        "delivery": "direct",
+        "precision": "f32",
+        "threads": 2,
+        "dt": 0.002,
+        "substeps": 4,
+        "gravity": [0.0, 0.0, -9.81],
+        "dof_names": dofs,
+        "coord_names": dofs,
+        "body_names": ["cartpole/cart"],
+        "shape_names": [],
+        "site_names": [],
+        "contact_sensor_names": [],
+        "actuator_names": [],
+        "keyframes": [{"name": "cartpole/home", **key}],
+        "robots": [robot],
+        "followers": [{"name": "a", "leader": "b", "multiplier": 1.0, "offset": 0.0}],
+        "fields": [field],
+        "known_fields": [field],
+        "commands": [effort],
+        "writes": [position],
+        "params": [{"place": None, "info": effort}],
+        "scene": "",
+        "scene_folder": "/",
+        "model_hash": 3,
+        "notes": [],
+        "warnings": ["a"],
+        "driven": [1, 4],
+        "angle_range": [None, [-1.0, 1.0]],
+        "frames_held": 4,
+        "watch_worlds": 4,
+        "watch_state_bytes": 64,
+        "joint_q_max": None,
+        "joint_qd_max": 1000.0,
+        "on_fault": "freeze",
+        "on_nan": "refuse",
+        "draws": "world",
+        "outputs_at": "frame",
+        "pace": {"realtime": 1.0, "period_ns": 1000, "late": "hold", "command_timeout_ns": None},
+        "state_bytes": 64,
+        "schema": 0,
+    }
+    write("description", "daemon.json", json.dumps(daemon, indent=1) + "\n")
+
+
+def sample(arrays: list[tuple[str, tuple[int, int], list[int], bytes]]) -> bytes:
+    """Lay out a field table with its arrays."""
+    offset = -(-len(arrays) * ROW_WORDS * 8 // LINE) * LINE
+    table, data = b"", b""
+    for name, (code, _), shape, entries in arrays:
+        axes = shape + [0] * (4 - len(shape))
+        numbers = (code | len(shape) << 32, *axes, 0, offset + len(data), len(entries))
+        table += name.encode().ljust(32, b"\0") + struct.pack("<8Q", *numbers)
+        data += entries + bytes(-len(entries) % LINE)
+    return table + bytes(offset - len(table)) + data
+
+
+def samples() -> None:
+    """Field tables, commands and heads of entries."""
+    floats = ("joint_f", F32, [4, 2], struct.pack("<8f", *range(8)))
+    doubles = ("joint_q", F64, [4, 2], struct.pack("<8d", *range(8)))
+    mask = ("mask", U8, [4], b"\1\0\1\0")
+    seed = ("seed", U64, [1], struct.pack("<Q", 7))
+    device = ("on_device", U64, [2], struct.pack("<2Q", 7, 1))
+    cases = {
+        "step": (1, [floats]),
+        "reset": (2, [seed, mask]),
+        "write": (3, [doubles, mask]),
+        "forward": (4, []),
+        "snapshot": (5, [("path", U8, [6], b"a.snap")]),
+        "restore": (6, [("path", U8, [6], b"a.snap"), ("from_world", U64, [1], struct.pack("<Q", 2)), mask]),
+        "on_device": (1, [floats, device]),
+        "on_device_alone": (1, [device]),
+    }
+    for name, (operation, arrays) in cases.items():
+        payload = sample(arrays)
+        write("command", name, bytes((operation, len(arrays))) + payload)
+        write("table", name, bytes((len(arrays),)) + payload)
+    write("journal", "state", struct.pack("<8Q", 1, 0, 256, 64, 0, 0, 0, 192))
+    write("journal", "step", struct.pack("<8Q", 1, 1, 192, 0, 64, 1 | 1 << 32, 8, 384))
+    write("journal", "end", struct.pack("<8Q", 1, 2, 10, 0, 0, 2**32 - 1, 0, 64))
+
+
+def varint(number: int) -> bytes:
+    """A number of protocol buffers."""
+    data = b""
+    while number > 0x7F:
+        data, number = data + bytes((number & 0x7F | 0x80,)), number >> 7
+    return data + bytes((number,))
+
+
+def field(number: int, value: bytes | str | int | float) -> bytes:
+    """A field of protocol buffers."""
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    if isinstance(value, float):
+        return varint(number << 3 | 5) + struct.pack("<f", value)
+    data = value.encode() if isinstance(value, str) else value
+    return varint(number << 3 | 2) + varint(len(data)) + data
+
+
+def node(operator: str, inputs: list[str], output: str, **attributes: int | float) -> bytes:
+    """An operator of a graph."""
+    data = b"".join(field(1, name) for name in inputs) + field(2, output) + field(4, operator)
+    for name, value in attributes.items():
+        data += field(5, field(1, name) + field(2 if isinstance(value, float) else 3, value))
+    return field(1, data)
+
+
+def tensor(name: str, shape: list[int], raw: bool = False) -> bytes:
+    """A constant, whose numbers are a quarter each."""
+    count = 1
+    data = field(2, 1) + field(8, name)
+    for size in shape:
+        data += field(1, size)
+        count *= size
+    return field(5, data + field(9 if raw else 4, struct.pack("<f", 0.25) * count))
+
+
+def port(number: int, name: str, size: int) -> bytes:
+    """An input or an output of a graph, of rows of that size."""
+    shape = field(1, field(2, "batch")) + field(1, field(1, size))
+    return field(number, field(1, name) + field(2, field(1, field(1, 1) + field(2, shape))))
+
+
+def policies() -> None:
+    """Multilayer perceptrons, which differ in how exporters write them."""
+    ends = port(11, "obs", 3) + port(12, "action", 2)
+    texts = field(14, field(1, "task") + field(2, "CartPole"))
+    weights = tensor("w", [2, 3]) + tensor("b", [2], raw=True)
+    square = tensor("s", [2, 2]) + tensor("r", [1, 2])
+    rows = "".join("gbmv")
+    statistics = b"".join(tensor(name, [3]) for name in rows)
+    external = field(13, field(1, "location") + field(2, "data"))
+    beside = field(5, field(1, 2) + field(1, 3) + field(2, 1) + field(8, "w") + field(14, 1) + external)
+    gemm = node("Gemm", ["obs", "w", "b"], "h", transB=1, alpha=1.0)
+    graphs = {
+        "gemm_elu": gemm + node("Elu", ["h"], "action", alpha=1.0) + weights,
+        "silu": gemm + node("Sigmoid", ["h"], "g") + node("Mul", ["h", "g"], "action") + weights,
+        "matmul": gemm + node("MatMul", ["h", "s"], "k") + node("Add", ["k", "r"], "action") + weights + square,
+        "clip": gemm + node("Clip", ["h"], "k", min=-1.0, max=1.0) + node("Tanh", ["k"], "action") + weights,
+        "normalized": node("BatchNormalization", ["obs", *rows], "n", epsilon=0.001)
+        + node("Gemm", ["n", "w"], "action", transB=1)
+        + statistics
+        + tensor("w", [2, 3]),
+        "folded": node("Sqrt", ["b"], "q")
+        + node("Transpose", ["w"], "t")
+        + node("MatMul", ["obs", "t"], "h")
+        + node("Div", ["h", "q"], "action")
+        + weights,
+        "external": node("Gemm", ["obs", "w"], "action", transB=1) + beside,
+    }
+    for name, graph in graphs.items():
+        write("onnx", name + ".onnx", field(7, graph + ends) + texts)
+
+
+CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+
+
+def meshes() -> None:
+    """A tetrahedron in each format."""
+    facets, records = "", b""
+    for face in FACES:
+        corners = [CORNERS[corner] for corner in face]
+        vertices = "".join("vertex {} {} {}\n".format(*corner) for corner in corners)
+        facets += f"facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n"
+        records += struct.pack("<12fH", 0, 0, 1, *(x for corner in corners for x in corner), 0)
+    write("mesh_stl", "text.stl", f"solid a\n{facets}endsolid a\n")
+    write("mesh_stl", "binary.stl", bytes(80) + struct.pack("<I", len(FACES)) + records)
+    vertices = "".join("v {} {} {}\n".format(*corner) for corner in CORNERS)
+    faces = "".join("f {} {} {}\n".format(*(corner + 1 for corner in face)) for face in FACES)
+    textured = "".join("f {}/1 {}/2/1 {}/-1\n".format(*(corner + 1 for corner in face)) for face in FACES)
+    write("mesh_obj", "plain.obj", vertices + faces)
+    write(
+        "mesh_obj",
+        "materials.obj",
+        f"mtllib mesh.mtl\n{vertices}vt 0 0\nvt 1 0\nusemtl red\n{faces}usemtl wood\n{textured}\n#mtl\n"
+        "newmtl red\nKd 1 0 0\nd 0.5\nnewmtl wood\nTr 0.2\nmap_Kd -s 1 1 1 wood.png\n",
+    )
+    write("mesh_obj", "colors.obj", vertices.replace("\n", " 1 0.5 0\n") + "f 1 2 \\\n3 4\n")
+    numbers = " ".join(str(x) for corner in CORNERS for x in corner)
+    corners = " ".join(str(corner) for face in FACES for corner in face)
+    effect = (
+        '<effect id="e"><profile_COMMON><technique sid="t"><lambert><diffuse><color>1 0 0 1</color></diffuse></lambert>'
+        "</technique></profile_COMMON></effect>"
+    )
+    columns = "".join(f'<param name="{name}" type="float"/>' for name in "XYZ")
+    accessor = f'<accessor source="#p-array" count="4" stride="3">{columns}</accessor>'
+    accessor = f"<technique_common>{accessor}</technique_common>"
+    vertex = '<input semantic="VERTEX" source="#v" offset="0"/>'
+    bound = '<instance_material symbol="m" target="#m"/>'
+    bound = f"<bind_material><technique_common>{bound}</technique_common></bind_material>"
+    pieces = {
+        "triangles": f'<triangles count="4" material="m">{vertex}<p>{corners}</p></triangles>',
+        "polylist": f'<polylist count="4" material="m">{vertex}<vcount>3 3 3 3</vcount><p>{corners}</p></polylist>',
+    }
+    for name, piece in pieces.items():
+        write(
+            "mesh_dae",
+            name + ".dae",
+            f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="0.01" name="centimeter"/><up_axis>Y_UP</up_axis></asset>
+<library_effects>{effect}</library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="p-array" count="12">{numbers}</float_array>{accessor}</source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+{piece}
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>
+<rotate>0 0 1 90</rotate><translate>1 2 3</translate><scale>1 1 2</scale>
+<instance_geometry url="#g">{bound}</instance_geometry>
+</node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>
+""",
+        )
+    positions = struct.pack("<12f", *(x for corner in CORNERS for x in corner))
+    indices = struct.pack("<12H", *(corner for face in FACES for corner in face))
+    buffer = positions + indices
+    scene = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            {"children": [1], "scale": [1, 1, 2]},
+            {"mesh": 0, "translation": [1, 0, 0], "rotation": [0, 0, 0, 1]},
+        ],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.5]}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0, "mode": 4}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": len(positions)},
+            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices)},
+        ],
+        "buffers": [{"byteLength": len(buffer)}],
+    }
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(buffer), b"BIN\0") + buffer
+    write("mesh_gltf", "binary.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    uri = "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()
+    embedded = scene | {"buffers": [{"byteLength": len(buffer), "uri": uri}]}
+    write("mesh_gltf", "embedded.gltf", json.dumps(embedded))
+
+
+def robots() -> None:
+    """The robots of the reader's tests, and one with a mesh."""
+    tests = ROOT / "sim-core" / "model" / "tests"
+    for file in (tests / "refused" / "everything.urdf", tests / "malformed" / "base.urdf"):
+        write("urdf", file.name, file.read_bytes())
+    cartpole = ROOT / "py-client" / "python" / "tightloop" / "assets" / "cartpole.urdf"
+    write("urdf", cartpole.name, cartpole.read_bytes())
+    shape = '<geometry><mesh filename="mesh.obj" scale="1 1 -1"/></geometry>'
+    write(
+        "urdf",
+        "mesh.urdf",
+        f'<robot name="a"><link name="b"><visual>{shape}</visual><collision>{shape}</collision></link>'
+        '<link name="c"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="j" type="continuous"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>'
+        '<mimic joint="k" multiplier="2"/></joint><link name="d"/><joint name="k" type="prismatic"><parent link="c"/>'
+        '<child link="d"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+        '<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j"/></transmission>'
+        "</robot>\n",
+    )
+
+
+def mujoco() -> None:
+    """Each model as it is, one change of each kind, and a file that has its format alone."""
+    for base, name in enumerate(("cart", "passive", "sensors", "machine")):
+        write("mujoco_arrays", name, bytes((base,)))
+        changes = [struct.pack("<HBBh", 40 * action + base, action, 3, 300) for action in range(8)]
+        for action, change in enumerate(changes):
+            write("mujoco_arrays", f"{name}_{action}", bytes((base,)) + change)
+    header = b'{"format":{"dtype":"I32","shape":[1],"data_offsets":[0,4]}}'
+    write("mujoco_file", "format", struct.pack("<Q", len(header)) + header + struct.pack("<i", 1))
+
+
+def programs() -> None:
+    """Choices of random code: a ramp, and one kind of step only."""
+    write("program", "ramp", bytes(range(200)))
+    for kind in (0, 2, 4, 9):
+        write("program", f"kind_{kind}", bytes((kind, 5, 3, 1, 2, 7)) * 30)
+
+
+CUBE = """dt = 0.002
+substeps = 2
+
+[[shape]]
+name = "ground"
+type = "plane"
+
+[[shape]]
+name = "box"
+type = "box"
+half_extents = [0.1, 0.1, 0.1]
+body = "cube"
+density = 400.0
+
+[[robot]]
+name = "cartpole"
+urdf = "robot.urdf"
+pos = [0.0, 2.0, 3.0]
+
+[[body]]
+name = "cube"
+pos = [0.0, 0.0, 0.2]
+"""
+EVERYTHING = """dt = 0.002
+substeps = 2
+gravity = [0.0, 0.0, "inf"]
+params = ["gravity", "shape_mu"]
+contacts_max = 10
+rows_max = 40
+friction_combine = "mean"
+contact_filters = [["cartpole", "cube"]]
+
+[solver]
+iterations = 5
+cone = "pyramidal"
+
+[[robot]]
+name = "cartpole"
+urdf = "robot.urdf"
+joint_q = [0.1, 0.2]
+joint_target_ke = 100.0
+floating = true
+
+[[body]]
+name = "cube"
+pos = [0.0, 0.0, 0.2]
+
+[[shape]]
+name = "ball"
+type = "sphere"
+radius = 0.1
+body = "cube"
+
+[[site]]
+name = "tip"
+body = "cartpole/pole"
+pos = [0.0, 0.0, 1.0]
+
+[[contact_sensor]]
+name = "touch"
+shapes = ["cube/ball"]
+"""
+
+
+def scenes() -> None:
+    """Scenes of the cart-pole, as TOML and as JSON."""
+    write("scene", "cube.toml", CUBE)
+    write("scene", "everything.toml", EVERYTHING)
+    robot = {"name": "cartpole", "urdf": "robot.urdf", "joint_q": ["inf", 0]}
+    write("scene", "robot.json", json.dumps({"dt": 0.002, "substeps": 1, "robot": [robot]}))
+
+
+def record(kind: int, words: bytes) -> bytes:
+    """A record of a recording."""
+    return struct.pack("<2Q", kind, len(words) // 8) + words
+
+
+def recordings() -> None:
+    """Records of each kind."""
+    text = b"{}".ljust(8, b"\0")
+    head = record(1, struct.pack("<Q", 2) + text) + record(2, struct.pack("<Q", 2) + text)
+    payload = sample([("joint_f", F32, [2, 2], struct.pack("<4f", *range(4)))])
+    digests = struct.pack("<2I", 1, 2)
+    command = struct.pack("<4Q", 1 | 1 << 32, len(payload) // 8, 2, 0) + payload + digests
+    write("recording", "records", head + record(3, command) + record(4, struct.pack("<Q", 3)))
+    write("recording", "end", head + record(5, struct.pack("<Q", 3) + b"end".ljust(8, b"\0")))
+    block = (ROOT / "tests" / "data" / "recorded" / "lesson.tlrec").read_bytes()[:4000]
+    write("recording", "cut.tlrec", block)
+
+
+def applied() -> None:
+    """Commands for two worlds of eight dofs, and a snapshot's head."""
+    efforts = ("joint_f", F32, [2, 8], struct.pack("<16f", *range(16)))
+    positions = ("joint_q", F32, [2, 9], struct.pack("<18f", *(0, 0, 0, 0, 0.2, 0, 0, 0, 1) * 2))
+    mask = ("mask", U8, [2], b"\1\0")
+    seed = ("seed", U64, [1], struct.pack("<Q", 7))
+    for name, operation, arrays in (
+        ("step", 1, [efforts]),
+        ("reset", 2, [seed, mask]),
+        ("write", 3, [positions, mask]),
+        ("forward", 4, []),
+    ):
+        write("command_applied", name, bytes((operation, len(arrays))) + sample(arrays))
+    head = b"tlsnap\r\n" + struct.pack("<2I2Q2I", 1, 0, 0, 2, 60, 4)
+    write("snapshot", "head", head + bytes(2 * (28 + 4 * 60)))
+    stored = (ROOT / "tests" / "data" / "recorded" / "machine_start.tlsnap").read_bytes()
+    write("snapshot", "machine.tlsnap", stored)
+
+
+def questions() -> None:
+    """Questions of inverse kinematics and of rollouts."""
+    reach = {"frame": "cartpole/pole", "relative_to": None}
+    reach |= {"position_weight": [1, 1, 1], "orientation_weight": [0, 0, 0]}
+    task = {"reaches": [reach], "moves": [True] * 8, "limits": True, "posture_weight": [0.1] * 8}
+    ik = {"task": task, "count": 2, "lengths": [0, 0, 6, 0], "iterations": 5, "restarts": 1, "seed": 1}
+    ik |= {"tolerance": [1e-3, 1e-2], "double": False, "threads": 1}
+    text = json.dumps(ik, separators=(",", ":")).encode()
+    write("ik", "two_targets", text + b"\0" + struct.pack("<6d", 0.1, 2, 3.5, -0.1, 2, 3.5))
+    columns = {"field": "joint_q", "places": [0, 1]}
+    field_term = {"source": {"field": {"columns": columns, "turned_by": None, "function": "sin"}}}
+    terms = [field_term, {"source": "last_action"}, {"source": {"input": 0}}]
+    terms.append({"source": {"clock": {"step": 0.1, "input": None}}})
+    for term in terms:
+        term |= {"minus": [], "scale": [], "clip": None, "history": 1}
+    drive = {"command": "joint_f", "columns": [0], "values": [0], "scale": [1], "offset": [0]}
+    drive |= {"low": [None], "high": [1], "followers": []}
+    sequence = {"frames": 1, "worlds": 2, "columns": 1}
+    question = {
+        "frames": 2,
+        "first": 0,
+        "size": 6,
+        "layers": [{"linear": {"inputs": 6, "outputs": 1}}, "tanh"],
+        "terms": terms,
+        "clip": [[-1], [1]],
+        "drives": [drive],
+        "inputs": [sequence],
+        "commands": [{"command": "joint_f", "first": 1, "values": sequence}],
+        "fields": ["joint_q"],
+        "collects": [True, True],
+        "lengths": [7, 0, 2, 2],
+    }
+    text = json.dumps(question, separators=(",", ":")).encode()
+    write("rollout", "policy", text + b"\0" + struct.pack("<11d", *([0.5] * 11)))
+
+
+if __name__ == "__main__":
+    lock_lines()
+    control()
+    description()
+    samples()
+    policies()
+    meshes()
+    robots()
+    mujoco()
+    programs()
+    scenes()
+    recordings()
+    applied()
+    questions()
