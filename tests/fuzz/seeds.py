@@ -7,6 +7,7 @@ stay as they are.
 import base64
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 FUZZ = Path(__file__).parent
@@ -122,7 +123,7 @@ def description() -> None:
     write("description", "daemon.json", json.dumps(daemon, indent=1) + "\n")
 
 
-def sample(arrays: list[tuple[str, tuple[int, int], list[int], bytes]]) -> bytes:
+def sample(arrays: Sequence[tuple[str, tuple[int, int], list[int], bytes]]) -> bytes:
     """Lay out a field table with its arrays."""
     offset = -(-len(arrays) * ROW_WORDS * 8 // LINE) * LINE
     table, data = b"", b""
