@@ -84,10 +84,10 @@ impl Handle {
     /// The calling process.
     pub fn this() -> Handle {
         let pid = id();
-        Handle::of(pid)
+        Handle::with_number(pid)
     }
 
-    fn of(pid: u32) -> Handle {
+    fn with_number(pid: u32) -> Handle {
         let serial = with(|world| world.serial(pid));
         Handle { pid, serial }
     }

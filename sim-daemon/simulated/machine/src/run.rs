@@ -55,7 +55,7 @@ struct Ended;
 
 impl Run {
     /// Runs a scenario, which is the first thread, of no process.
-    pub fn of(&self, scenario: impl Fn() + Send + Sync + 'static) -> Outcome {
+    pub fn play(&self, scenario: impl Fn() + Send + Sync + 'static) -> Outcome {
         static HOOK: Once = Once::new();
         HOOK.call_once(|| {
             set_hook(Box::new(|panic| {

@@ -71,6 +71,10 @@ impl Sub<Duration> for Instant {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SystemTime(pub(crate) i64);
 
+/// A time that was said to be past lies ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Later;
+
 impl SystemTime {
     /// The time now.
     pub fn now() -> SystemTime {
@@ -82,11 +86,11 @@ impl SystemTime {
     ///
     /// # Errors
     /// Nothing but that it was later.
-    pub fn elapsed(&self) -> Result<Duration, ()> {
+    pub fn elapsed(&self) -> Result<Duration, Later> {
         let passed = SystemTime::now().0 - self.0;
         u64::try_from(passed)
             .map(Duration::from_nanos)
-            .map_err(drop)
+            .map_err(|_| Later)
     }
 }
 

@@ -135,7 +135,7 @@ fn opened() -> File {
 #[test]
 fn every_call_fails_once_in_a_while() {
     for seed in 0..20 {
-        let outcome = run(seed, 300_000).of(|| {
+        let outcome = run(seed, 300_000).play(|| {
             for (name, call) in CALLS {
                 drop(opened());
                 let outcomes: BTreeSet<bool> = (0..100).map(|_| call()).collect();
@@ -166,7 +166,7 @@ fn a_seed_gives_the_same_run_of_files() {
             trace: true,
             ..run(seed, 100_000)
         }
-        .of(racing)
+        .play(racing)
     };
     let [one, same, other] = [7, 7, 8].map(traced);
     assert_eq!(one.failure, None);
@@ -234,11 +234,11 @@ fn a_request_to_stop_sets_flags_or_kills() {
 fn a_file_that_outlives_its_run_is_dropped_in_silence() {
     let kept: Arc<Mutex<Vec<File>>> = Arc::default();
     let keeper = Arc::clone(&kept);
-    let outcome = run(1, 0).of(move || {
+    let outcome = run(1, 0).play(move || {
         keeper.lock().unwrap().push(File::open("/tmp").unwrap());
     });
     assert_eq!(outcome.failure, None);
-    let panicking = run(1, 0).of(|| {
+    let panicking = run(1, 0).play(|| {
         let _file = File::open("/tmp").unwrap();
         panic!("on purpose");
     });

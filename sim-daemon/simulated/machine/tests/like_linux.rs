@@ -179,7 +179,7 @@ fn random_calls_give_what_they_give_on_linux() {
         std::fs::remove_dir_all(&root).unwrap();
         let given: Arc<Mutex<Vec<String>>> = Arc::default();
         let (lines, folder) = (Arc::clone(&given), root.clone());
-        let outcome = run(seed, 0).of(move || {
+        let outcome = run(seed, 0).play(move || {
             sim_machine::fs::create_dir_all(&folder).unwrap();
             *lines.lock().unwrap() = on_the_machine(&folder, seed);
         });

@@ -40,7 +40,7 @@ fn a_seed_is_a_run_and_another_seed_another_run() {
         }
         sim_machine::note(|| format!("{:?}", shared.lock().unwrap()));
     };
-    let [one, same, other] = [1, 1, 2].map(|seed| run(seed).of(racing));
+    let [one, same, other] = [1, 1, 2].map(|seed| run(seed).play(racing));
     assert_eq!(one.failure, None);
     assert_eq!(one.trace, same.trace);
     assert_ne!(one.trace.last(), other.trace.last());
@@ -49,7 +49,7 @@ fn a_seed_is_a_run_and_another_seed_another_run() {
 #[test]
 fn waits_end_by_the_clock_of_the_machine_and_by_a_word() {
     for seed in 0..200 {
-        let outcome = run(seed).of(|| {
+        let outcome = run(seed).play(|| {
             let begin = Instant::now();
             let shared = Arc::new((Mutex::new(false), Condvar::new()));
             let (other, (sender, receiver)) = (Arc::clone(&shared), mpsc::channel());
@@ -80,7 +80,7 @@ fn waits_end_by_the_clock_of_the_machine_and_by_a_word() {
 #[test]
 fn a_killed_process_takes_no_further_step() {
     for seed in 0..200 {
-        let outcome = run(seed).of(|| {
+        let outcome = run(seed).play(|| {
             let count = Arc::new(AtomicU64::new(0));
             let counter = Arc::clone(&count);
             let pid = process::spawn(move || {

@@ -104,7 +104,7 @@ impl Actor {
                     self.frames.push((frame, count));
                 }
                 sleep(Duration::from_millis(time));
-                if random() % 2 == 0 {
+                if random().is_multiple_of(2) {
                     self.frames.clear();
                 }
             }

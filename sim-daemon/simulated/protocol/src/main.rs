@@ -44,7 +44,7 @@ struct Simulate {
 fn main() -> ExitCode {
     let args = Simulate::parse();
     if args.trace {
-        let plan = Plan::of(args.seed);
+        let plan = Plan::from_seed(args.seed);
         let (outcome, _) = scene::run(&plan, true);
         println!(
             "{plan:#?}\n{}\n{:?}",
@@ -71,7 +71,7 @@ fn main() -> ExitCode {
 fn here(args: &Simulate) -> Option<(u64, u64)> {
     let (mut steps, mut commands) = (0, 0);
     for seed in args.seed..args.seed + args.runs.unwrap_or(RUNS_MAX) {
-        let plan = Plan::of(seed);
+        let plan = Plan::from_seed(seed);
         let (outcome, carried_out) = scene::run(&plan, false);
         steps += outcome.steps;
         commands += carried_out;

@@ -85,7 +85,7 @@ pub struct Plan {
 
 impl Plan {
     /// The plan of a seed.
-    pub fn of(seed: u64) -> Plan {
+    pub fn from_seed(seed: u64) -> Plan {
         let rng = &mut Rng::with_seed(seed ^ 0x706c_616e);
         let clients = rng.usize(1..5);
         let fates = rng.usize(0..9);

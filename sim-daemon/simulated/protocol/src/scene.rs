@@ -43,7 +43,7 @@ pub fn run(plan: &Plan, trace: bool) -> (Outcome, u64) {
         steps_max: STEPS_MAX,
         trace,
     };
-    let outcome = run.of(move || play(&carried, &facts));
+    let outcome = run.play(move || play(&carried, &facts));
     let commands = seen.commands();
     (outcome, commands)
 }
@@ -188,7 +188,7 @@ impl Cast<'_> {
         sim_machine::calm();
         // by then nobody is stopped and shared memory has room
         sleep(Duration::from_secs(7));
-        let overwritten = sim_machine::iceoryx2::overwritten();
+        let overwritten = sim_machine::overwritten();
         assert_eq!(
             overwritten, 0,
             "frames were overwritten that somebody holds"

@@ -53,7 +53,7 @@ impl File {
     /// Those of the system.
     pub fn metadata(&self) -> io::Result<Metadata> {
         call("looks at an open file", |files: &mut Files| {
-            Ok(files.metadata(files.of(self.0)?.inode))
+            Ok(files.metadata(files.by_number(self.0)?.inode))
         })
     }
 
@@ -83,7 +83,7 @@ impl File {
 
     pub(crate) fn set_mode(&self, mode: u32) -> io::Result<()> {
         call("sets a mode", |files: &mut Files| {
-            let inode = files.of(self.0)?.inode;
+            let inode = files.by_number(self.0)?.inode;
             files.inode_mut(inode).mode = mode;
             Ok(())
         })
@@ -107,7 +107,7 @@ impl File {
         call(
             format_args!("reads {} bytes at {at}", bytes.len()),
             |files: &mut Files| {
-                let opened = files.of(self.0)?;
+                let opened = files.by_number(self.0)?;
                 match opened.is_readable {
                     true => files.read(opened.inode, bytes, at),
                     false => err(EBADF),
@@ -140,7 +140,7 @@ impl File {
 
     /// The file, if it may be written.
     fn written(&self, files: &Files) -> io::Result<u64> {
-        let opened = files.of(self.0)?;
+        let opened = files.by_number(self.0)?;
         match opened.is_writable {
             true => Ok(opened.inode),
             false => err(EBADF),
@@ -162,7 +162,7 @@ impl Read for File {
         call(
             format_args!("reads {} bytes", bytes.len()),
             |files: &mut Files| {
-                let opened = files.of(self.0)?;
+                let opened = files.by_number(self.0)?;
                 if !opened.is_readable {
                     return err(EBADF);
                 }
@@ -180,7 +180,7 @@ impl Write for File {
             format_args!("writes {} bytes", bytes.len()),
             |files: &mut Files| {
                 let inode = self.written(files)?;
-                let at = files.of(self.0)?.at;
+                let at = files.by_number(self.0)?.at;
                 let written = files.write(inode, bytes, at)?;
                 files.of_mut(self.0)?.at += written as u64;
                 Ok(written)

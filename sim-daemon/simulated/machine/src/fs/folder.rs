@@ -42,7 +42,7 @@ pub struct FileType {
 
 impl Folder {
     fn inode(&self, files: &Files) -> io::Result<u64> {
-        Ok(files.of(self.file.0)?.inode)
+        Ok(files.by_number(self.file.0)?.inode)
     }
 }
 

@@ -76,7 +76,7 @@ impl Files {
         opened.filter(|opened| opened.process == process).count() as u64
     }
 
-    pub(super) fn of(&self, number: u64) -> io::Result<&Opened> {
+    pub(super) fn by_number(&self, number: u64) -> io::Result<&Opened> {
         self.opened.get(&number).map_or(err(EBADF), Ok)
     }
 

@@ -50,7 +50,7 @@ pub(crate) fn remove_stale_resources(
         Section::enter().ok_or(NodeCleanupFailure::AnotherInstanceIsCleaningUpTheNode)?;
     // without details iceoryx2 looks in its usual folder, where nothing is
     let details = details.ok_or(NodeCleanupFailure::ResourcesAlreadyCleanedUp)?;
-    let names = Names::of(details.config());
+    let names = Names::for_config(details.config());
     lock(&names, node)?;
     let cleaned = remove_all(&names, node);
     match cleaned {
@@ -141,8 +141,8 @@ fn remove_node(names: &Names, node: u128, service: u128) -> bool {
         let ports = with(|world| {
             let service = world.wires.services.get(&service);
             let entries = service.map_or(&[][..], |service| service.entries(role));
-            let own = entries.iter().filter(|entry| entry.node == node);
-            own.map(|entry| entry.port).collect::<Vec<_>>()
+            let of_node = entries.iter().filter(|entry| entry.node == node);
+            of_node.map(|entry| entry.port).collect::<Vec<_>>()
         });
         for port in ports {
             match role {

@@ -112,7 +112,7 @@ fn join(plan: &Plan, ports: (u128, u128), end: End, other: &Entry) {
 }
 
 fn is_joined(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &Entry) -> bool {
-    let own = match end {
+    let port = match end {
         End::Sender => sender,
         End::Receiver => receiver,
     };
@@ -133,14 +133,14 @@ fn is_joined(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &En
     }
     match end {
         End::Sender => with(|world| {
-            if let Some(outlet) = world.wires.outlets.get_mut(&own) {
+            if let Some(outlet) = world.wires.outlets.get_mut(&port) {
                 outlet.peers.insert(receiver, connection);
             }
-            world.deliver_history(own, connection, other.history);
+            world.deliver_history(port, connection, other.history);
         }),
         End::Receiver => {
             let opened = system_call("opens a segment").is_ok()
-                && with(|world| world.open_segment(own, sender, connection));
+                && with(|world| world.open_segment(port, sender, connection));
             if !opened {
                 leave(connection, End::Receiver);
                 return false;
@@ -188,7 +188,7 @@ impl World {
     }
 
     /// Opens the memory of a sender, whose file must be there.
-    fn open_segment(&mut self, own: u128, sender: u128, connection: u64) -> bool {
+    fn open_segment(&mut self, port: u128, sender: u128, connection: u64) -> bool {
         let Wires {
             inlets,
             segments,
@@ -196,7 +196,7 @@ impl World {
             last,
             ..
         } = &mut self.wires;
-        let Some(inlet) = inlets.get_mut(&own) else {
+        let Some(inlet) = inlets.get_mut(&port) else {
             return false;
         };
         let is_there = segments.contains(&sender) && self.files.exists(&inlet.names.data(sender));

@@ -24,7 +24,7 @@ pub(crate) struct Monitor {
 const MONITOR: &str = ".node_monitor";
 
 impl Names {
-    pub(crate) fn of(config: &Config) -> Names {
+    pub(crate) fn for_config(config: &Config) -> Names {
         let root = PathBuf::from(config.global.root_path().to_string());
         Names {
             nodes: PathBuf::from(config.global.node_dir().to_string()),

@@ -170,7 +170,7 @@ impl<S: Service> Node<S> {
         config: &Config,
         mut callback: impl FnMut(NodeState<S>) -> CallbackProgression,
     ) -> Result<(), NodeListFailure> {
-        let names = Names::of(config);
+        let names = Names::for_config(config);
         system_call("lists the nodes").map_err(|_| NodeListFailure::InternalError)?;
         let files = with(|world| world.files.names(names.nodes()));
         for id in files.iter().filter_map(|file| names.monitored(file)) {
@@ -279,7 +279,7 @@ impl NodeBuilder {
     /// Those of the system.
     pub fn create<S: Service>(self) -> Result<Node<S>, NodeCreationFailure> {
         let failed = NodeCreationFailure::InternalError;
-        let names = Names::of(&self.config);
+        let names = Names::for_config(&self.config);
         let name = match self.name {
             Some(name) => name,
             None => NodeName::new("").map_err(|_| failed)?,

@@ -54,9 +54,9 @@ fn seen(matches: impl Fn(u64) -> bool) -> usize {
         return 0;
     }
     with(|world| {
-        let own = world.process();
+        let process = world.process();
         let seen = world.wires.damages.seen.iter();
-        seen.filter(|(pid, owner)| *pid == own && matches(*owner))
+        seen.filter(|(pid, owner)| *pid == process && matches(*owner))
             .count()
     })
 }

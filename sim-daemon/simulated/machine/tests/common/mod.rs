@@ -20,7 +20,7 @@ pub fn run(seed: u64, failing: u32) -> Run {
 /// Runs a scenario with many seeds.
 pub fn with_seeds(scenario: impl Fn() + Send + Sync + Clone + 'static) {
     for seed in 0..100 {
-        let outcome = run(seed, 0).of(scenario.clone());
+        let outcome = run(seed, 0).play(scenario.clone());
         assert_eq!(outcome.failure, None, "{seed}");
     }
 }

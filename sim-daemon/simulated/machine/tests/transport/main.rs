@@ -59,7 +59,7 @@ fn check(scenario: impl Fn() + Send + Sync + Clone + 'static) {
 
 fn check_with(run: impl Fn(u64) -> Run, scenario: impl Fn() + Send + Sync + Clone + 'static) {
     for seed in 0..SEEDS {
-        let outcome = run(seed).of(scenario.clone());
+        let outcome = run(seed).play(scenario.clone());
         if let Some(failure) = outcome.failure {
             let last = outcome.trace.len().saturating_sub(60);
             panic!(

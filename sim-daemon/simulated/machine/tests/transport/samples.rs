@@ -170,7 +170,7 @@ fn a_seed_decides_every_door_of_the_transport() {
         clean();
         drop(receiver);
     };
-    let [one, same, other] = [1, 1, 2].map(|seed| run(seed).of(scenario));
+    let [one, same, other] = [1, 1, 2].map(|seed| run(seed).play(scenario));
     assert_eq!(one.failure, None);
     assert!(one.trace.len() > 50);
     assert_eq!(one.trace, same.trace);

@@ -60,7 +60,7 @@ where
     ) -> Result<Self, ClientCreateError> {
         let settings = &factory.settings;
         let channels = settings.lanes[1].channels;
-        let slots = Slots::of::<Q, QH>(channels, length_max);
+        let slots = Slots::sized::<Q, QH>(channels, length_max);
         let port = tagged(&factory.service, Role::Client)
             .map_err(|_| ClientCreateError::UnableToCreatePortTag)?;
         open_outlet(&port, slots).map_err(|_| ClientCreateError::UnableToCreateDataSegment)?;

@@ -29,7 +29,7 @@ pub(crate) struct Slots {
 
 impl Slots {
     /// With so many entries of a type, and a header.
-    pub(crate) fn of<T, H>(count: usize, length_max: usize) -> Slots {
+    pub(crate) fn sized<T, H>(count: usize, length_max: usize) -> Slots {
         Slots {
             count,
             loans_max: count,

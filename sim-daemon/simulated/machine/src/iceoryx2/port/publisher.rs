@@ -46,7 +46,7 @@ where
         let slots = Slots {
             loans_max,
             history: settings.history,
-            ..Slots::of::<T, H>(count, length_max)
+            ..Slots::sized::<T, H>(count, length_max)
         };
         let port = tagged(&factory.service, Role::Publisher)
             .map_err(|_| PublisherCreateError::UnableToCreatePortTag)?;

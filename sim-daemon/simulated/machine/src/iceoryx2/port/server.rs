@@ -54,7 +54,7 @@ where
         let clients = settings.ports_max.get(&Role::Client).copied();
         let requests = clients.unwrap_or(1) * 2 * active;
         let count = requests * (lane.buffer + lane.borrowed + loans_max);
-        let slots = Slots::of::<R, RH>(count, length_max);
+        let slots = Slots::sized::<R, RH>(count, length_max);
         let port = tagged(&factory.service, Role::Server)
             .map_err(|_| ServerCreateError::UnableToCreatePortTag)?;
         let entry = port.entry(active, 0);

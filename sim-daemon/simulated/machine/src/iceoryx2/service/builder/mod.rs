@@ -179,8 +179,8 @@ impl Base {
         let (hash, names) = (self.hash(), &self.node.names);
         loop {
             step("looks for a service");
-            let found = with(|world| world.look(&names.service(&hash)))?;
-            if let Some((id, settings)) = found {
+            let settings_there = with(|world| world.look(&names.service(&hash)))?;
+            if let Some((id, settings)) = settings_there {
                 if !self.is_compatible(&settings) {
                     return Err(Failure::Incompatible);
                 }
