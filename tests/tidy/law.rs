@@ -94,3 +94,12 @@ pub const UNSAFE: [&str; 57] = [
     "sim-daemon/system/src/windows/process.rs",         // as clock.rs
     "sim-daemon/system/src/windows/storage.rs",         // as clock.rs
 ];
+
+/// Whether a line has `package::` as a word of its own: `hash::` is not `ash::`.
+pub fn names_package(line: &str, package: &str) -> bool {
+    let path = format!("{package}::");
+    line.match_indices(&path).any(|(at, _)| {
+        let before = line[..at].chars().next_back();
+        before.is_none_or(|c| !c.is_alphanumeric() && c != '_')
+    })
+}

@@ -6,7 +6,7 @@ mod length;
 mod order;
 mod protocol;
 
-use law::{DOORS, UNSAFE};
+use law::{DOORS, UNSAFE, names_package};
 use order::ORDER;
 use sim_physics::arrays::Field;
 use std::collections::BTreeSet;
@@ -244,23 +244,11 @@ fn heavy_packages_have_one_door() {
     for path in sources() {
         for (package, door) in DOORS {
             let used = code(&path).iter().any(|line| names_package(line, package));
-            let doors = DOORS.iter().filter(|(other, _)| *other == package);
-            let is_door = doors.clone().any(|(_, door)| path.starts_with(door));
-            assert!(
-                !used || is_door,
-                "{path} uses {package}; its door is {door}"
-            );
+            let mut doors = DOORS.iter().filter(|(other, _)| *other == package);
+            let is_door = doors.any(|(_, door)| path.starts_with(door));
+            assert!(!used || is_door, "{path} uses {package}, not {door}");
         }
     }
-}
-
-/// Whether a line has `package::` as a word of its own: `hash::` is not `ash::`.
-fn names_package(line: &str, package: &str) -> bool {
-    let path = format!("{package}::");
-    line.match_indices(&path).any(|(at, _)| {
-        let before = line[..at].chars().next_back();
-        before.is_none_or(|c| !c.is_alphanumeric() && c != '_')
-    })
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub fn journal_parts(header: &JournalHeader, payload_bytes: usize) -> Option<[us
     header.parts(payload_bytes)
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
     use serde_json::{Value, json};

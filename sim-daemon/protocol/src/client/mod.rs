@@ -465,7 +465,7 @@ impl Client {
     }
 
     /// Lets a test send what it likes through the ports of the lease, and reads the answer.
-    #[cfg(test)]
+    #[cfg(all(test, not(simulated)))]
     pub(crate) fn raw(
         &self,
         send: impl FnOnce(&crate::transport::CommandPublisher<crate::presence::connection::S>, u64),
@@ -477,7 +477,7 @@ impl Client {
     }
 
     /// Lets a test take the lease for another process, which never opens its ports.
-    #[cfg(test)]
+    #[cfg(all(test, not(simulated)))]
     pub(crate) fn ask_for_lease(&self, pid: u32) -> bool {
         let granted = self.connection.ask(
             &Request::Acquire { pid },
@@ -487,7 +487,7 @@ impl Client {
     }
 
     /// Asks for a journal that is never joined. Returns whether it was granted.
-    #[cfg(test)]
+    #[cfg(all(test, not(simulated)))]
     pub(crate) fn ask_for_journal(&self) -> bool {
         let request = Request::Journal { observed: 0 };
         let granted = self

@@ -11,7 +11,7 @@ mod observers;
 mod orphans;
 mod pace;
 mod state;
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests;
 pub mod watch;
 mod worlds;

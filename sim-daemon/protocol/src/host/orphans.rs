@@ -88,7 +88,7 @@ fn ids(file: &Path) -> Vec<u128> {
         .collect()
 }
 
-#[cfg(all(test, unix))]
+#[cfg(all(test, unix, not(simulated)))]
 mod tests {
     use super::*;
     use std::fs::{

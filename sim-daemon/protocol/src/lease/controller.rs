@@ -216,7 +216,7 @@ impl Controller {
     }
 
     /// Lets a test send what it likes, and reads the answer.
-    #[cfg(test)]
+    #[cfg(all(test, not(simulated)))]
     pub(crate) fn raw(
         &mut self,
         send: impl FnOnce(&CommandPublisher<S>, u64),
@@ -298,14 +298,8 @@ impl Controller {
         }
         let table = check_table(&mut self.table, payload, header.rows)?;
         let base = payload.as_ptr() as usize;
-        let reader = Arc::clone(&self.subscriber);
-        Ok(Frame::new(
-            (header, base),
-            sample,
-            table,
-            &self.frames,
-            reader,
-        ))
+        let (head, reader) = ((header, base), Arc::clone(&self.subscriber));
+        Ok(Frame::new(head, sample, table, &self.frames, reader))
     }
 }
 

@@ -121,7 +121,7 @@ impl Problem {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 

@@ -357,5 +357,5 @@ fn sweep_remains(folder: &Path) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests;

@@ -383,7 +383,7 @@ fn made_folder(path: &Path) -> std::io::Result<(Metadata, PathBuf)> {
     Ok((metadata, files::absolute(path)?))
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 

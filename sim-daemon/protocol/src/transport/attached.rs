@@ -49,7 +49,7 @@ fn said(clients: BTreeMap<u32, usize>) -> String {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 

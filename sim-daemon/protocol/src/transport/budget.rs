@@ -147,7 +147,7 @@ pub(crate) fn used(folder: &Path) -> u64 {
     lengths.sum()
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 

@@ -72,7 +72,7 @@ fn core_or_unknown() -> u64 {
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 

@@ -152,7 +152,7 @@ impl<T> DerefMut for Held<'_, T> {
     }
 }
 
-#[cfg(all(test, not(loom)))]
+#[cfg(all(test, not(any(loom, simulated))))]
 mod tests {
     use super::*;
     use crate::waiting::hook::keep_waiting;

@@ -35,7 +35,7 @@ impl Fnv {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::Fnv;
 

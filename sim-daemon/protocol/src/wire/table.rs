@@ -156,7 +156,7 @@ impl Table {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(simulated)))]
 mod tests {
     use super::*;
 
