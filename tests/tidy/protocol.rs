@@ -30,7 +30,7 @@ const REAL: [&str; 8] = [
     "waiting/park.rs",
 ];
 
-/// Files whose types lie in shared memory, with the marker of the transport that says so.
+/// Files whose types lie in shared memory, and have the transport's marker for that.
 const MARKED: [&str; 2] = ["wire/header.rs", "wire/journal_header.rs"];
 
 /// Whether a line names what a door leads to, past the door.

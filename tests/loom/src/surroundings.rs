@@ -93,7 +93,7 @@ pub mod sample {
     impl<S, P: ?Sized, H> Drop for Sample<S, P, H> {
         fn drop(&mut self) {
             self.slot.with_mut(|given_back| {
-                // SAFETY: whoever uses the slot without an order between the two fails the model.
+                // SAFETY: a thread that uses the slot without an order between the two fails the model.
                 unsafe { *given_back += 1 }
             });
         }

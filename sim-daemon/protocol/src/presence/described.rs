@@ -102,7 +102,7 @@ pub(crate) fn mark_unreached(
 ) {
     let path = unreached(paths, session, port);
     let unnamed = path.with_extension("unreached_new");
-    // a client that cannot be told waits for as long as it does
+    // without room for the file, the client waits for as long as it does
     if let Ok(mut file) = private().create(true).truncate(true).open(&unnamed) {
         let _ = file.write_all(reason.to_string().as_bytes());
         let _ = fs::rename(unnamed, path);

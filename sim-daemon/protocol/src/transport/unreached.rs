@@ -1,5 +1,5 @@
-//! Ports that another port could not be connected to. The transport goes on without them, so that whoever waits for a message of
-//! theirs would wait in vain.
+//! Ports that another port could not be connected to. The transport goes on without them, so that a process that waits for a
+//! message of theirs would wait in vain.
 
 use std::cell::RefCell;
 

@@ -36,7 +36,7 @@ fn short_sleep() {
 }
 
 #[test]
-fn one_process_at_a_time_has_a_lock_whoever_dies() {
+fn one_process_at_a_time_has_a_lock_also_when_some_die() {
     with_seeds(|| {
         let holders = Arc::new(AtomicUsize::new(0));
         let taken = Arc::new(AtomicUsize::new(0));

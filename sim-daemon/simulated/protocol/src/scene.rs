@@ -217,7 +217,7 @@ impl Cast<'_> {
         assert!(left.is_empty(), "left behind: {left:?}");
     }
 
-    /// A daemon that lives serves whoever comes, and keeps nothing of those who went.
+    /// A daemon that lives serves the next client, and keeps nothing of those who went.
     fn last_client(&self) {
         let lives = || {
             let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());

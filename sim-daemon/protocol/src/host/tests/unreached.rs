@@ -45,7 +45,7 @@ fn a_client_that_cannot_open_the_answers_of_the_daemon_names_the_file_at_once() 
     for file in &cut {
         fs::rename(file.with_extension("kept"), file).unwrap();
     }
-    // what one client could not open is no other one's trouble
+    // what one client could not open costs no other one anything
     fake.attach().forward(&mut keep_waiting()).unwrap();
 }
 

@@ -81,7 +81,7 @@ pub(crate) fn remove_service(names: &Names, id: u128, hash: &str) {
     connect::remove("removes the settings of a service", names.service(hash));
 }
 
-/// A port, and whoever has a sample of it.
+/// A port, and those who have a sample of it.
 #[derive(Debug)]
 pub(crate) struct Port {
     pub(crate) id: u128,

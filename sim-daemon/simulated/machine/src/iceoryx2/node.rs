@@ -51,7 +51,7 @@ impl NodeDetails {
     }
 }
 
-/// A node, and whoever has something of it.
+/// A node, and those who have something of it.
 #[derive(Debug)]
 pub(crate) struct NodeHandle {
     pub(crate) id: u128,
