@@ -100,8 +100,11 @@ pub(crate) fn node<S: Service>(
 fn close_folders(config: &Config) {
     let nodes = fs::read_dir(Path::new(config.global.node_dir().as_str()));
     for node in nodes.into_iter().flatten().flatten() {
-        // a node that ends meanwhile takes its folder with it
-        crate::doors::system::files::close_to_others(&node.path());
+        // the mode of a monitor's file says whether its process has finished it
+        if node.file_type().is_ok_and(|kind| kind.is_dir()) {
+            // a node that ends meanwhile takes its folder with it
+            crate::doors::system::files::close_to_others(&node.path());
+        }
     }
 }
 
