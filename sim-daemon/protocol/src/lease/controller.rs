@@ -87,7 +87,8 @@ impl Controller {
         frames: &Arc<Alive>,
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
-        let start = Instant::now();
+        // from the first answer on, since a daemon at long work answers late
+        let mut answered = None;
         // what an earlier call did not wait for may be granted yet, to nobody
         let (own_pid, abandoned) = (crate::doors::process::id(), &connection.abandoned);
         let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
@@ -99,13 +100,14 @@ impl Controller {
                 },
                 Err(error) => error,
             };
+            let answered: Instant = *answered.get_or_insert_with(Instant::now);
             // a daemon that is short of time takes a lease back whose ports it did not see in time, and cleans up after a
             // dead holder late
             let again = match error {
                 ProtocolError::Transport { .. } | ProtocolError::LeaseLost { .. } => true,
                 ProtocolError::LeaseHeld { pid, .. } => {
                     process::is_gone(pid, connection.peer.beacon.pid)
-                        || was_abandoned && pid == own_pid && start.elapsed() < ABANDONED_MAX
+                        || was_abandoned && pid == own_pid && answered.elapsed() < ABANDONED_MAX
                 }
                 ProtocolError::Interrupted | ProtocolError::Timeout { .. } => {
                     abandoned.store(true, Ordering::Relaxed);
@@ -113,7 +115,7 @@ impl Controller {
                 }
                 _ => false,
             };
-            if !again || start.elapsed() > ACQUIRE_MAX {
+            if !again || answered.elapsed() > ACQUIRE_MAX {
                 return Err(error);
             }
             pause(hook)?;
