@@ -9,6 +9,10 @@ pub(crate) struct Process {
     pub(crate) serial: u64,
     pub(crate) parent: u32,
     pub(crate) state: State,
+    /// When it came to that [ns].
+    pub(crate) since: u64,
+    /// Doors that it passes yet.
+    pub(crate) doors: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +45,15 @@ impl World {
     /// The process of the calling thread; 0 is the test's own.
     pub(crate) fn process(&self) -> u32 {
         self.tasks.get(me()).map_or(0, |task| task.process)
+    }
+
+    /// Counts a door of the calling process; whether it is killed there.
+    pub(crate) fn is_last_door(&mut self) -> bool {
+        let pid = self.process();
+        self.processes.get_mut(&pid).is_some_and(|process| {
+            process.doors -= 1;
+            process.doors == 0
+        })
     }
 
     fn serial(&self, pid: u32) -> u64 {
@@ -104,6 +117,17 @@ impl Handle {
         }
     }
 
+    /// Kills it at the door that it passes after so many others, one or more.
+    pub fn kill_at_door(self, doors: u64) {
+        if self.is_alive() {
+            with(|world| {
+                if let Some(process) = world.processes.get_mut(&self.pid) {
+                    process.doors = doors;
+                }
+            });
+        }
+    }
+
     /// Stops it until [`Handle::resume`].
     pub fn stop(self) {
         if self.is_alive() {
@@ -130,12 +154,15 @@ pub fn start(main: impl FnOnce() + Send + 'static) -> Handle {
         let (pid, parent) = (world.number(), world.process());
         world.serials += 1;
         let (serial, state) = (world.serials, State::Running);
+        let (since, doors) = (world.now, u64::MAX);
         world.processes.insert(
             pid,
             Process {
                 serial,
                 parent,
                 state,
+                since,
+                doors,
             },
         );
         world.line(|| format!("starts process {pid}"));
@@ -165,7 +192,7 @@ pub fn kill(pid: u32) {
         if process.state == State::Dead {
             return;
         }
-        process.state = State::Dead;
+        (process.state, process.since) = (State::Dead, world.now);
         // threads stay where they are; one with the same number must not bring them back
         for task in &mut world.tasks {
             if task.process == pid {
@@ -198,7 +225,7 @@ fn change(pid: u32, from: State, to: State) {
         if let Some(process) = world.processes.get_mut(&pid)
             && process.state == from
         {
-            process.state = to;
+            (process.state, process.since) = (to, world.now);
             world.line(|| format!("process {pid} is {to:?}"));
         }
     });
@@ -207,6 +234,25 @@ fn change(pid: u32, from: State, to: State) {
 /// Whether a process lives, stopped ones included.
 pub fn is_alive(pid: u32) -> bool {
     with(|world| world.is_alive(pid))
+}
+
+/// Since when the process of this number has been dead [ns].
+pub fn dead_since(pid: u32) -> Option<u64> {
+    since(pid, State::Dead)
+}
+
+/// Since when the process of this number has been stopped [ns].
+pub fn stopped_since(pid: u32) -> Option<u64> {
+    since(pid, State::Stopped)
+}
+
+fn since(pid: u32, state: State) -> Option<u64> {
+    with(|world| {
+        let process = world.processes.get(&pid);
+        process
+            .filter(|process| process.state == state)
+            .map(|process| process.since)
+    })
 }
 
 /// The processes that live.

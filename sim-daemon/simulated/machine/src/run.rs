@@ -24,6 +24,8 @@ pub struct Run {
     pub failing: u32,
     /// Notifications in a million that are lost.
     pub dropping: u32,
+    /// Doors in a million behind which a thread loses its core for up to 16 ms.
+    pub preempting: u32,
     /// Sleepers wake this much later, at most, once in sixteen times [ns].
     pub lateness: u64,
     /// Doors after which a run has failed: something never ends.
@@ -72,6 +74,7 @@ impl Run {
         let mut world = World::new(self.seed);
         (world.failing, world.lateness) = (self.failing, self.lateness);
         (world.dropping, world.steps_max) = (self.dropping, self.steps_max);
+        world.preempting = self.preempting;
         world.trace = self.trace.then(Default::default);
         let begin = world.now;
         exchange(Some(world));
@@ -106,9 +109,9 @@ impl Run {
     }
 }
 
-/// From now on no call fails and no notification is lost.
+/// From now on no call fails, no notification is lost and no thread loses its core.
 pub fn calm() {
-    with(|world| (world.failing, world.dropping) = (0, 0));
+    with(|world| (world.failing, world.dropping, world.preempting) = (0, 0, 0));
 }
 
 /// Does something after a time, in the process of the caller.

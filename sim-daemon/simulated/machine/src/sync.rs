@@ -98,7 +98,9 @@ impl Condvar {
         let until = now() + time.as_nanos() as u64;
         queue(&self.waiting).push_back(thread::this());
         drop(guard);
-        let woken = thread::block(until);
+        // who was notified before it sleeps does not sleep
+        let waits = queue(&self.waiting).contains(&thread::this());
+        let woken = !waits || thread::block(until);
         queue(&self.waiting).retain(|task| *task != thread::this());
         mutex
             .lock()

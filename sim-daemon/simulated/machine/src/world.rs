@@ -39,6 +39,8 @@ pub(crate) struct World {
     pub(crate) failing: u32,
     /// Notifications in a million that are lost.
     pub(crate) dropping: u32,
+    /// Doors in a million behind which a thread loses its core for a while.
+    pub(crate) preempting: u32,
     /// How far the clock of the calendar is ahead of the monotonic one [ns].
     pub(crate) calendar: i64,
     /// Cores that processes see.
@@ -103,12 +105,19 @@ pub fn step(door: impl Display) {
     if !is_on() {
         return;
     }
-    with(|world| {
+    let (is_last, waits) = with(|world| {
         world.steps += 1;
         world.now += world.rng.u64(20..DOOR_MAX);
         world.line(|| door.to_string());
+        (world.is_last_door(), world.lose_core())
     });
+    if is_last {
+        crate::process::exit();
+    }
     shuttle::thread::yield_now();
+    if waits {
+        with(|world| world.task(me()).wake = 0);
+    }
 }
 
 /// A door whose call may fail as system calls do: out of room or of open files, a signal, a broken disk, no right.
@@ -159,6 +168,7 @@ impl World {
             system: System::new(),
             failing: 0,
             dropping: 0,
+            preempting: 0,
             calendar: 0,
             cores,
             lateness: 1_000_000,
@@ -186,6 +196,17 @@ impl World {
                 line()
             ));
         }
+    }
+
+    /// Takes the core of the calling thread away for a while, from microseconds to 16 ms; whether it did.
+    fn lose_core(&mut self) -> bool {
+        if self.preempting == 0 || self.rng.u32(0..1_000_000) >= self.preempting {
+            return false;
+        }
+        let time = 1000 << self.rng.u32(0..14);
+        let until = self.now + self.rng.u64(time..2 * time);
+        self.task(me()).wake = until;
+        true
     }
 
     pub(crate) fn task(&mut self, task: usize) -> &mut Task {

@@ -14,6 +14,7 @@ fn run(seed: u64) -> Run {
         seed,
         failing: 0,
         dropping: 0,
+        preempting: 0,
         lateness: 1_000_000,
         steps_max: 100_000,
         trace: true,
@@ -105,4 +106,25 @@ fn a_killed_process_takes_no_further_step() {
         });
         assert_eq!(outcome.failure, None, "{seed}");
     }
+}
+
+#[test]
+fn a_process_is_killed_at_the_door_that_was_named() {
+    let outcome = run(3).of(|| {
+        let passed = Arc::new(AtomicU64::new(0));
+        let inside = Arc::clone(&passed);
+        let doomed = process::start(move || {
+            process::Handle::this().kill_at_door(3);
+            loop {
+                sim_machine::step("goes on");
+                inside.fetch_add(1, Ordering::Relaxed);
+            }
+        });
+        while doomed.is_alive() {
+            thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(passed.load(Ordering::Relaxed), 2);
+        assert!(process::dead_since(doomed.pid).is_some());
+    });
+    assert_eq!(outcome.failure, None);
 }

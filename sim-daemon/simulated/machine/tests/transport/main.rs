@@ -46,6 +46,7 @@ fn run(seed: u64) -> Run {
         seed,
         failing: 0,
         dropping: 0,
+        preempting: 0,
         lateness: 1_000_000,
         steps_max: 300_000,
         trace: true,
