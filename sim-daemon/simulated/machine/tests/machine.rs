@@ -110,7 +110,7 @@ fn a_killed_process_takes_no_further_step() {
 
 #[test]
 fn a_process_is_killed_at_the_door_that_was_named() {
-    let outcome = run(3).of(|| {
+    let outcome = run(3).play(|| {
         let passed = Arc::new(AtomicU64::new(0));
         let inside = Arc::clone(&passed);
         let doomed = process::start(move || {

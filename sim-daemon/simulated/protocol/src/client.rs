@@ -1,44 +1,50 @@
 //! A client, in a process of its own, that does what its plan says and checks what it gets.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::time::Duration;
 
-use sim_machine::thread::sleep;
+use sim_machine::process::Handle;
+use sim_machine::sync::Arc;
+use sim_machine::thread::{Builder, JoinHandle, sleep};
 use sim_machine::time::now;
 use sim_machine::{note, random};
-use sim_protocol_simulated::{
-    AttachOptions, Client, Frame, Hook, Journal, ProtocolError, RefusalKind, keep_waiting,
-};
+use sim_protocol_simulated::{AttachOptions, Client, Frame, Hook, Journal, keep_waiting, stop};
 
-use crate::daemon::{BODY, NAME, ROOT};
+use crate::calls::{CALL_MAX, Caller, END_MAX, Got, START_MAX, is_there};
+use crate::daemon::{BODY, NAME, root};
 use crate::facts::Facts;
 use crate::plan::Act;
 
-/// A call that nobody holds up returns within this time [ns]: a lease is asked for again for 10 s.
-const CALL_MAX: u64 = 14_000_000_000;
-
-/// The same where calls of the system fail [ns].
-const ANSWER_MAX: u64 = 40_000_000_000;
-
-/// What a client has.
+/// What a process has.
 pub struct Actor {
     facts: Facts,
-    /// Whether calls of the system fail in this run.
-    failing: bool,
-    client: Option<Client>,
+    seat: Option<Seat>,
+    /// The other client of this process.
+    other: Option<Seat>,
     frames: Vec<(Frame, u64)>,
 }
 
-/// What a call gives, and what it is called.
-type Got<T> = Result<T, ProtocolError>;
+/// A client, and the thread that uses it besides.
+struct Seat {
+    client: Arc<Client>,
+    caller: Caller,
+    beside: Option<JoinHandle<()>>,
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        if let Some(beside) = self.beside.take() {
+            let _ = beside.join();
+        }
+    }
+}
 
 impl Actor {
-    pub fn new(facts: &Facts, failing: bool) -> Actor {
+    pub fn new(facts: &Facts) -> Actor {
         Actor {
             facts: facts.clone(),
-            failing,
-            client: None,
+            seat: None,
+            other: None,
             frames: Vec::new(),
         }
     }
@@ -54,52 +60,108 @@ impl Actor {
             }
         }
         self.frames.clear();
-        self.client = None;
+        self.detach();
+        std::mem::swap(&mut self.seat, &mut self.other);
+        self.detach();
     }
 
     fn act(&mut self, act: Act) {
         match act {
             Act::Attach(wait) => self.attach(Duration::from_millis(wait)),
+            Act::DieAtDoor(doors) => Handle::this().kill_at_door(doors),
             Act::Rest(time) => sleep(Duration::from_millis(time)),
-            Act::Detach => self.client = None,
+            Act::Detach => self.detach(),
+            Act::Swap => std::mem::swap(&mut self.seat, &mut self.other),
+            Act::Beside(count) => self.begin_beside(count),
             _ => {
-                let Some(client) = self.client.take() else {
+                let Some(seat) = &self.seat else {
                     return;
                 };
-                if self.use_client(&client, act).is_some() {
-                    self.client = Some(client);
+                let (client, caller) = (Arc::clone(&seat.client), seat.caller.clone());
+                if self.use_client(&client, &caller, act).is_none() {
+                    drop(client);
+                    self.detach();
                 }
             }
         }
     }
 
+    /// Lets go of the client.
+    fn detach(&mut self) {
+        let Some(seat) = self.seat.take() else {
+            return;
+        };
+        let id = seat.caller.id;
+        drop(seat);
+        self.facts.holds(id, now());
+    }
+
+    /// Lets another thread use the client, which it holds until it is done.
+    fn begin_beside(&mut self, count: u8) {
+        let Some(seat) = &mut self.seat else {
+            return;
+        };
+        if let Some(before) = seat.beside.take() {
+            let _ = before.join();
+        }
+        seat.caller.is_shared = true;
+        let (client, caller) = (Arc::clone(&seat.client), seat.caller.clone());
+        let beside = move || {
+            for _ in 0..count {
+                if use_beside(&client, &caller).is_none() {
+                    break;
+                }
+            }
+        };
+        seat.beside = Builder::new().spawn(beside).ok();
+    }
+
+    /// Ends the daemon, as a process does that is no client.
+    pub fn end(&self) {
+        let options = AttachOptions {
+            root: Some(root()),
+            wait: Duration::ZERO,
+        };
+        let caller = Caller::new(&self.facts, None);
+        let end = || stop(NAME, &options, &mut keep_waiting());
+        let _ = self.facts.ask_all(|| caller.timed("stop", END_MAX, end));
+    }
+
     fn attach(&mut self, wait: Duration) {
-        self.client = None;
-        let root = Some(PathBuf::from(ROOT));
-        let options = AttachOptions { root, wait };
+        self.detach();
+        let options = AttachOptions {
+            root: Some(root()),
+            wait,
+        };
         let attach = || Client::attach(NAME, &options, &mut keep_waiting());
-        self.client = self.timed("attach", wait.as_nanos() as u64, attach).ok();
+        let longest = START_MAX + wait.as_nanos() as u64;
+        let attached = Caller::new(&self.facts, None).timed("attach", longest, attach);
+        self.seat = attached.ok().map(|client| Seat {
+            caller: Caller::new(&self.facts, Some(client.description().session)),
+            client: Arc::new(client),
+            beside: None,
+        });
     }
 
     /// `None` where the daemon is gone.
-    fn use_client(&mut self, client: &Client, act: Act) -> Option<()> {
+    fn use_client(&mut self, client: &Client, caller: &Caller, act: Act) -> Option<()> {
         let hook: Hook<'_> = &mut keep_waiting();
         match act {
             Act::Steps(count) => {
                 for _ in 0..count {
-                    let frame = self.timed("step", 0, || client.step(&[], hook));
+                    let frame = caller.control("step", client, || client.step(&[], hook));
                     self.look(frame)?;
                 }
             }
             Act::SendRecv(time) => {
-                if is_there(&self.timed("send", 0, || client.send(&[], hook)))? {
+                if is_there(&caller.control("send", client, || client.send(&[], hook)))? {
                     sleep(Duration::from_millis(time));
-                    let frame = self.timed("recv", 0, || client.recv(hook));
+                    let frame = caller.control("recv", client, || client.recv(hook));
                     self.look(frame)?;
                 }
             }
             Act::Hold(time) => {
-                let frame = self.timed("step", 0, || client.step(&[], hook));
+                let frame = caller.control("step", client, || client.step(&[], hook));
                 if let Some((frame, count)) = self.look(frame)? {
                     self.frames.push((frame, count));
                 }
@@ -109,17 +171,25 @@ impl Actor {
                 }
             }
             Act::Reset => {
-                self.look_at(self.timed("reset", 0, || client.reset(None, None, hook)))?
+                self.look_at(caller.control("reset", client, || client.reset(None, None, hook)))?
             }
-            Act::Forward => self.look_at(self.timed("forward", 0, || client.forward(hook)))?,
+            Act::Forward => {
+                self.look_at(caller.control("forward", client, || client.forward(hook)))?
+            }
             Act::Interrupt => {
                 let stop: Hook<'_> = &mut || ControlFlow::Break(());
-                self.look_at(self.timed("step", 0, || client.step(&[], stop)))?;
+                self.look_at(caller.interrupted("step", client, || client.step(&[], stop)))?;
             }
-            Act::Release => drop(self.timed("release", 0, || client.release(hook))),
+            Act::Take(gives_back) => {
+                is_there(&caller.control("acquire", client, || client.acquire(hook)))?;
+                if gives_back {
+                    drop(caller.control("release", client, || client.release(hook)));
+                }
+            }
+            Act::Release => drop(caller.control("release", client, || client.release(hook))),
             Act::Observe(count) => {
                 for _ in 0..count {
-                    let seen = self.timed("latest", 0, || client.latest(hook));
+                    let seen = caller.timed("latest", CALL_MAX, || client.latest(hook));
                     is_there(&seen)?;
                     self.keep(seen);
                     sleep(Duration::from_millis(random() % 40));
@@ -128,17 +198,52 @@ impl Actor {
             Act::Newer(time) => {
                 let timeout = Duration::from_millis(time);
                 let newer = || client.wait_newer(Some(timeout), hook);
-                let seen = self.timed("wait_newer", timeout.as_nanos() as u64, newer);
+                let seen = caller.timed("wait_newer", CALL_MAX + timeout.as_nanos() as u64, newer);
                 is_there(&seen)?;
                 self.keep(seen);
             }
             Act::Ask => {
-                is_there(&self.timed("controller", 0, || client.controller(hook)))?;
-                is_there(&self.timed("timing", 0, || client.timing(false, hook)))?;
+                let began = now();
+                let holder = caller.timed("controller", CALL_MAX, || client.controller(hook));
+                is_there(&holder)?;
+                if let Ok(Some(pid)) = holder {
+                    caller.is_held_by(pid, began);
+                }
+                is_there(&caller.timed("timing", CALL_MAX, || client.timing(false, hook)))?;
             }
-            Act::Record(count) => self.record(client, count)?,
-            Act::Shutdown => drop(self.timed("shutdown", 0, || client.shutdown(hook))),
-            Act::Attach(_) | Act::Rest(_) | Act::Detach => unreachable!("they need no client"),
+            Act::Count => {
+                is_there(&caller.timed("observers", CALL_MAX, || client.observers(hook)))?;
+            }
+            Act::Refused => {
+                let refused = || client.snapshot("/nowhere", hook);
+                is_there(&caller.control("snapshot", client, refused))?;
+            }
+            Act::ReleaseInside => {
+                let release: Hook<'_> = &mut || {
+                    let _ = client.release(&mut keep_waiting());
+                    ControlFlow::Break(())
+                };
+                is_there(&caller.interrupted("step", client, || client.step(&[], release)))?;
+            }
+            Act::Record(count) => record(client, caller, count)?,
+            Act::RecordAll => {
+                let fields = ["count".to_owned()];
+                let all = [(); 4].map(|()| client.journal(&fields, hook));
+                let refused = all.iter().find_map(|journal| journal.as_ref().err());
+                assert!(refused.is_none(), "nobody records: {refused:?}");
+            }
+            Act::Shutdown => drop(caller.timed("shutdown", CALL_MAX, || {
+                self.facts.ask(client.description().session);
+                client.shutdown(hook)
+            })),
+            Act::Attach(_)
+            | Act::Rest(_)
+            | Act::Detach
+            | Act::DieAtDoor(_)
+            | Act::Swap
+            | Act::Beside(_) => {
+                unreachable!("they use no client here")
+            }
         }
         Some(())
     }
@@ -169,51 +274,53 @@ impl Actor {
             .got((head.session, head.epoch, head.ack_seq), count);
         Some(Some((frame, count)))
     }
+}
 
-    fn record(&self, client: &Client, count: u8) -> Option<()> {
-        let hook: Hook<'_> = &mut keep_waiting();
-        let fields = ["count".to_owned()];
-        let opened = self.timed("journal", 0, || client.journal(&fields, hook));
-        is_there(&opened)?;
-        let Ok(mut journal) = opened else {
-            return Some(());
-        };
-        let mut counted = None;
-        for _ in 0..count {
-            let next = self.timed("next", 30_000_000, || {
-                entry(&mut journal, &mut counted, hook)
-            });
-            if is_there(&next)? == (matches!(next, Ok(false))) {
-                break;
+/// Uses a client that another thread uses, too; `None` where the daemon is gone.
+fn use_beside(client: &Client, caller: &Caller) -> Option<()> {
+    let hook: Hook<'_> = &mut keep_waiting();
+    match random() % 16 {
+        0 => drop(caller.control("release", client, || client.release(hook))),
+        1 => {
+            is_there(&caller.timed("latest", CALL_MAX, || client.latest(hook)))?;
+        }
+        2 => {
+            let newer = || client.wait_newer(Some(Duration::from_millis(20)), hook);
+            is_there(&caller.timed("wait_newer", CALL_MAX, newer))?;
+        }
+        3 => {
+            is_there(&caller.timed("controller", CALL_MAX, || client.controller(hook)))?;
+        }
+        4 => sleep(Duration::from_millis(random() % 30)),
+        _ => {
+            let frame = caller.control("step", client, || client.step(&[], hook));
+            is_there(&frame)?;
+            let head = frame.map(|frame| (*frame.header(), whole(&frame)));
+            if let Ok((head, count)) = head {
+                let id = (head.session, head.epoch, head.ack_seq);
+                caller.facts.got(id, count);
             }
         }
-        Some(())
     }
+    Some(())
+}
 
-    /// Makes a call, and checks that it returns in time and with an error that can be.
-    fn timed<T>(&self, what: &str, allowed: u64, call: impl FnOnce() -> Got<T>) -> Got<T> {
-        let began = now();
-        let result = call();
-        let waited = now() - began;
-        let took = waited.saturating_sub(self.facts.stopped_since(began));
-        let error = result.as_ref().err();
-        note(|| match error {
-            None => format!("{what}: done"),
-            Some(error) => format!("{what}: {error}"),
-        });
-        let may_fail = self.failing || self.facts.was_squeezed(began);
-        // a frame whose memory cannot be made is waited for as long as one whose daemon stands
-        let longest = if may_fail { ANSWER_MAX } else { CALL_MAX };
-        assert!(
-            took < longest + allowed,
-            "{what} took {:.1} s: {error:?}",
-            took as f64 / 1e9
-        );
-        if let Some(error) = error {
-            assert!(may_fail || is_expected(error), "{what}: {error}; {error:?}");
+fn record(client: &Client, caller: &Caller, count: u8) -> Option<()> {
+    let hook: Hook<'_> = &mut keep_waiting();
+    let fields = ["count".to_owned()];
+    let opened = caller.timed("journal", CALL_MAX, || client.journal(&fields, hook));
+    is_there(&opened)?;
+    let Ok(mut journal) = opened else {
+        return Some(());
+    };
+    let mut counted = None;
+    for _ in 0..count {
+        let next = caller.timed("next", CALL_MAX, || entry(&mut journal, &mut counted, hook));
+        if is_there(&next)? == (matches!(next, Ok(false))) {
+            break;
         }
-        result
     }
+    Some(())
 }
 
 /// Takes an entry of a journal; false if none came. Steps count on from where the state was, gaps aside.
@@ -262,37 +369,4 @@ fn whole(frame: &Frame) -> u64 {
     let is_torn = count.iter().chain(&body).any(|word| *word != count[0]);
     assert!(!is_torn, "a torn frame: {count:?} {body:?}");
     count[0]
-}
-
-/// Whether a call was done; `None` where its daemon is gone.
-fn is_there<T>(result: &Got<T>) -> Option<bool> {
-    match result {
-        Err(ProtocolError::DaemonLost { .. } | ProtocolError::DaemonRestarted { .. }) => None,
-        Err(_) => Some(false),
-        Ok(_) => Some(true),
-    }
-}
-
-/// Whether an error tells of what other processes do, and not of a fault.
-fn is_expected(error: &ProtocolError) -> bool {
-    use ProtocolError::{
-        CommandRefused, DaemonLost, DaemonRestarted, FramesHeld, Interrupted, LeaseHeld, LeaseLost,
-        NoDaemon, NothingSent, Silent, Starting, StepInFlight,
-    };
-    match error {
-        NoDaemon { .. }
-        | Starting { .. }
-        | Silent { .. }
-        | DaemonLost { .. }
-        | DaemonRestarted { .. } => true,
-        LeaseHeld { .. }
-        | LeaseLost { .. }
-        | FramesHeld { .. }
-        | NothingSent
-        | StepInFlight
-        | Interrupted => true,
-        // of a write, and when four others record
-        CommandRefused { kind, .. } => *kind == RefusalKind::Backend,
-        _ => false,
-    }
 }

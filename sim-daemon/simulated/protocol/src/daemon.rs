@@ -1,6 +1,6 @@
 //! A daemon without physics, with the threads of the real one: its worlds count steps.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use sim_machine::sync::Arc;
@@ -12,15 +12,19 @@ use sim_machine::{process, step, thread};
 use sim_protocol_simulated::daemon_lock::DaemonLock;
 use sim_protocol_simulated::host::watch::{Places, Watch};
 use sim_protocol_simulated::host::{FrameMemory, Host, Next, Worlds};
-use sim_protocol_simulated::paths::DaemonPaths;
+use sim_protocol_simulated::paths::{DaemonPaths, default_root};
 use sim_protocol_simulated::{
     Description, Dtype, FieldInfo, Op, ProtocolError, RefusalKind, Table, sweep,
 };
 
 use crate::facts::{Facts, kinds_of_files};
 
-/// Where daemons are, and the name of the only one.
-pub const ROOT: &str = "/root/of/daemons";
+/// Where daemons are: in the folder that goes with the last of them.
+pub fn root() -> PathBuf {
+    default_root()
+}
+
+/// Its name.
 pub const NAME: &str = "counter";
 
 /// Words of a frame besides the count, all of which have its value.
@@ -67,7 +71,8 @@ pub fn run(facts: &Facts, parent: u32) -> Result<(), ProtocolError> {
 }
 
 fn serve(facts: &Facts, stop: &Arc<AtomicBool>, places: &Places) -> Result<(), ProtocolError> {
-    let root = Some(Path::new(ROOT));
+    let root = root();
+    let root = Some(root.as_path());
     sweep(root)?;
     let daemon_lock = DaemonLock::take(&DaemonPaths::new(root, NAME)?)?;
     places.keep(&daemon_lock);
@@ -75,7 +80,7 @@ fn serve(facts: &Facts, stop: &Arc<AtomicBool>, places: &Places) -> Result<(), P
     let slots = slots.map(|(name, shape, first)| (name.to_owned(), Dtype::U64, shape, first));
     let table = Table::over_arena(slots, 64 + 8 * BODY);
     let mut host = Host::open(daemon_lock, description(), table, &[], Arc::clone(stop))?;
-    facts.begins_with(kinds_of_files());
+    facts.serves(host.description().session, kinds_of_files());
     let (end, ended) = channel::<()>();
     let mut cleanup = host.client_cleanup();
     let janitor = thread::Builder::new().spawn(move || {
@@ -100,10 +105,11 @@ fn answer(host: &mut Host, facts: &Facts) -> Result<(), ProtocolError> {
                 match host.inbox().op() {
                     Op::Step => worlds.0 += 1,
                     // as a command that only the backend refuses
-                    Op::Write => {
-                        host.refuse(RefusalKind::Backend, "these worlds have no state");
+                    Op::Snapshot => {
+                        host.refuse(RefusalKind::Backend, "these worlds are in no file");
                         continue;
                     }
+                    Op::Reset => thread::sleep(facts.slow()),
                     _ => {}
                 }
                 facts.carry_out((head.session, head.epoch, head.seq), worlds.0);

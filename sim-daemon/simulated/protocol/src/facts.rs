@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use sim_machine::fs;
+use sim_machine::process;
 use sim_machine::process::Handle;
 use sim_machine::time::now;
+
+use crate::plan::Plan;
 
 /// Files in shared memory, by their kind: the ending of their name, or where they are.
 pub fn kinds_of_files() -> BTreeMap<String, usize> {
@@ -30,6 +34,14 @@ pub fn kinds_of_files() -> BTreeMap<String, usize> {
 /// A command, everywhere and always: run of the daemon, lease, number.
 pub type Id = (u64, u64, u64);
 
+/// A client, everywhere and always: process, and which client of all.
+pub type ClientId = (u32, u64);
+
+/// A holder whose heartbeats stopped for so long loses the lease, and the time that a call may take besides [ns].
+const SILENT: u64 = 2_600_000_000;
+/// A process that is stopped for less misses no heartbeat that matters, nor its time to join [ns].
+const MISSED: u64 = 400_000_000;
+
 /// What is known, for all processes and outside of the machine.
 #[derive(Debug, Clone, Default)]
 pub struct Facts(Arc<Mutex<Known>>);
@@ -40,9 +52,27 @@ struct Known {
     carried_out: BTreeMap<Id, u64>,
     /// The lease of each run whose commands were carried out last.
     lease: BTreeMap<u64, u64>,
-    /// Times in which a process was stopped [ns]: begin and end.
-    stopped: Vec<(u64, u64)>,
-    daemon: Option<Handle>,
+    /// Times in which a process was stopped [ns]: begin and end, with its number.
+    stopped: Vec<(u64, u64, u32)>,
+    /// Until when a client may hold a lease [ns].
+    holds: BTreeMap<ClientId, u64>,
+    clients: u64,
+    /// Daemons that served, by their run, and since when [ns].
+    serving: BTreeMap<u64, (Handle, u64)>,
+    /// Runs whose end somebody asked for.
+    asked: Vec<u64>,
+    asked_daemons: Vec<Handle>,
+    /// How many ask for the end of whatever daemon runs, and when the last one had done so [ns].
+    ends: u64,
+    asked_all: u64,
+    /// Calls of the system fail.
+    failing: bool,
+    /// Threads lose their core, or wake late.
+    uneven: bool,
+    /// How long a reset takes [ms].
+    slow: u64,
+    /// As they were launched.
+    daemons: Vec<Handle>,
     owner: Option<Handle>,
     /// When something last happened that a wait may have to sit out [ns].
     squeezed: u64,
@@ -52,6 +82,17 @@ struct Known {
 }
 
 impl Facts {
+    /// At the begin of a plan.
+    pub fn for_plan(plan: &Plan) -> Facts {
+        let facts = Facts::default();
+        facts.known(|known| {
+            known.failing = plan.failing > 0;
+            known.uneven = plan.preempting > 0 || plan.lateness > 1000;
+            known.slow = plan.slow;
+        });
+        facts
+    }
+
     fn known<T>(&self, look: impl FnOnce(&mut Known) -> T) -> T {
         look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -89,9 +130,153 @@ impl Facts {
     }
 
     /// A process is stopped from now on, for so long [ns].
-    pub fn stop(&self, time: u64) {
+    pub fn stop(&self, pid: u32, time: u64) {
         let now = now();
-        self.known(|known| known.stopped.push((now, now + time)));
+        self.known(|known| known.stopped.push((now, now + time, pid)));
+    }
+
+    /// From then on nobody is stopped, and shared memory has room [ns].
+    pub fn calm_at(&self) -> u64 {
+        self.known(|known| {
+            let ends = known.stopped.iter().map(|stop| stop.1);
+            ends.fold(known.squeezed, u64::max)
+        })
+    }
+
+    /// From now on no call fails.
+    pub fn calm(&self) {
+        self.known(|known| (known.failing, known.uneven) = (false, false));
+    }
+
+    /// Whether calls that began then may fail.
+    pub fn may_fail(&self, since: u64) -> bool {
+        self.known(|known| known.failing) || self.was_squeezed(since)
+    }
+
+    /// Whether some threads may wait while others go on.
+    pub fn is_uneven(&self) -> bool {
+        self.known(|known| known.uneven)
+    }
+
+    /// How long a reset takes.
+    pub fn slow(&self) -> Duration {
+        Duration::from_millis(self.known(|known| known.slow))
+    }
+
+    /// A client of this process, which holds nothing.
+    pub fn client(&self) -> ClientId {
+        self.known(|known| {
+            known.clients += 1;
+            (process::id(), known.clients)
+        })
+    }
+
+    /// A client may hold a lease until then [ns].
+    pub fn holds(&self, client: ClientId, until: u64) {
+        self.known(|known| known.holds.insert(client, until));
+    }
+
+    /// A client was refused the lease, for which it asked then, since that process holds it.
+    ///
+    /// # Panics
+    /// That cannot be.
+    pub fn held_by(&self, pid: u32, client: ClientId, since: u64) {
+        let now = now();
+        self.known(|known| {
+            let may =
+                |(id, until): (&ClientId, &u64)| id.0 == pid && *until >= since && *id != client;
+            assert!(
+                known.holds.iter().any(may),
+                "process {pid} has given the lease back that keeps {client:?} out"
+            );
+            let is_late = |begin: Option<u64>, time| begin.is_some_and(|begin| begin + time < now);
+            let dead = process::dead_since(pid);
+            assert!(
+                !is_late(dead, if client.1 == 0 { SILENT } else { MISSED }),
+                "process {pid} is dead and keeps {client:?} out"
+            );
+            let stopped = process::stopped_since(pid).filter(|begin| begin + SILENT < since);
+            // a daemon that did not run does not know how long others were silent
+            let excused =
+                |&(_, end, who): &(u64, u64, u32)| who != pid && end > stopped.unwrap_or(0);
+            assert!(
+                stopped.is_none() || known.slow > 0 || known.stopped.iter().any(excused),
+                "process {pid} is silent and keeps {client:?} out"
+            );
+        });
+    }
+
+    /// A client lost its lease.
+    ///
+    /// # Panics
+    /// It was there all the time.
+    pub fn lost_lease(&self, client: ClientId) {
+        self.known(|known| {
+            let time = |&(begin, end, pid): &(u64, u64, u32)| match pid == client.0 {
+                true => end.min(now()) - begin,
+                false => 0,
+            };
+            let stopped: u64 = known.stopped.iter().map(time).sum();
+            assert!(
+                stopped >= MISSED,
+                "{client:?} lost its lease, and was there"
+            );
+        });
+    }
+
+    /// Somebody asks for the end of this run.
+    pub fn ask(&self, session: u64) {
+        self.known(|known| known.asked.push(session));
+    }
+
+    /// Somebody asks this daemon to end.
+    pub fn ask_daemon(&self, daemon: Handle) {
+        self.known(|known| known.asked_daemons.push(daemon));
+    }
+
+    /// Somebody asks for the end of whatever daemon runs, during that call.
+    pub fn ask_all<T>(&self, call: impl FnOnce() -> T) -> T {
+        self.known(|known| known.ends += 1);
+        let result = call();
+        let now = now();
+        self.known(|known| (known.ends, known.asked_all) = (known.ends - 1, now));
+        result
+    }
+
+    /// A run is said to be over.
+    ///
+    /// # Panics
+    /// Its daemon lives, and nobody asked it to end.
+    pub fn is_over(&self, session: u64) {
+        self.known(|known| {
+            let lives = known.lives(session, u64::MAX);
+            assert!(!lives, "the daemon of run {session:x} lives");
+        });
+    }
+
+    /// No daemon was there since then, it is said.
+    ///
+    /// # Panics
+    /// One was.
+    pub fn nobody_serves(&self, since: u64) {
+        self.known(|known| {
+            let mut sessions = known.serving.keys();
+            let lives = sessions.find(|session| known.lives(**session, since));
+            assert!(lives.is_none(), "the daemon of run {lives:x?} lives");
+        });
+    }
+
+    /// This daemon ends.
+    ///
+    /// # Panics
+    /// Nobody asked it to.
+    pub fn ends(&self, may_fail: bool) {
+        let this = Handle::this();
+        self.known(|known| {
+            let mut runs = known.serving.iter().filter(|run| run.1.0 == this);
+            let unasked = runs.any(|(session, run)| !known.is_asked(*session, *run));
+            assert!(may_fail || !unasked, "nobody asked this daemon to end");
+        });
     }
 
     /// Shared memory is short, or calls fail.
@@ -107,13 +292,26 @@ impl Facts {
     /// Time since then in which somebody was stopped [ns].
     pub fn stopped_since(&self, since: u64) -> u64 {
         let now = now();
-        let overlap = |&(begin, end): &(u64, u64)| end.min(now).saturating_sub(begin.max(since));
+        let overlap =
+            |&(begin, end, _): &(u64, u64, u32)| end.min(now).saturating_sub(begin.max(since));
         self.known(|known| known.stopped.iter().map(overlap).sum())
     }
 
-    /// Notes the files of a daemon before anybody came.
-    pub fn begins_with(&self, files: BTreeMap<String, usize>) {
-        self.known(|known| known.files = files);
+    /// This daemon serves from now on; with its files before anybody came.
+    pub fn serves(&self, session: u64, files: BTreeMap<String, usize>) {
+        let (this, now) = (Handle::this(), now());
+        self.known(|known| {
+            known.files = files;
+            known.serving.insert(session, (this, now));
+        });
+    }
+
+    /// Whether the daemon of a run lives.
+    pub fn serves_still(&self, session: u64) -> bool {
+        self.known(|known| {
+            let run = known.serving.get(&session);
+            run.is_some_and(|(daemon, _)| daemon.is_alive())
+        })
     }
 
     /// Those files.
@@ -123,16 +321,39 @@ impl Facts {
 
     /// Notes the daemon and its owner.
     pub fn launched(&self, owner: Handle, daemon: Handle) {
-        self.known(|known| (known.owner, known.daemon) = (Some(owner), Some(daemon)));
+        self.known(|known| {
+            known.owner = Some(owner);
+            known.daemons.push(daemon);
+        });
     }
 
     /// The daemon launched last.
     pub fn daemon(&self) -> Option<Handle> {
-        self.known(|known| known.daemon)
+        self.known(|known| known.daemons.last().copied())
+    }
+
+    /// All that were launched.
+    pub fn daemons(&self) -> Vec<Handle> {
+        self.known(|known| known.daemons.clone())
     }
 
     /// Its owner.
     pub fn owner(&self) -> Option<Handle> {
         self.known(|known| known.owner)
+    }
+}
+
+impl Known {
+    fn is_asked(&self, session: u64, (daemon, since): (Handle, u64)) -> bool {
+        let is_named = self.asked.contains(&session) || self.asked_daemons.contains(&daemon);
+        is_named || self.ends > 0 || self.asked_all >= since
+    }
+
+    /// Whether the daemon of a run that began to serve before that time lives, and is not to end.
+    fn lives(&self, session: u64, before: u64) -> bool {
+        let run = self.serving.get(&session);
+        run.is_some_and(|&(daemon, since)| {
+            since < before && daemon.is_alive() && !self.is_asked(session, (daemon, since))
+        })
     }
 }

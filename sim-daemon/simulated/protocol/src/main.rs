@@ -1,5 +1,6 @@
 //! `simulate`: runs seeds of daemon, clients and observers on a simulated machine, until one fails.
 
+mod calls;
 mod client;
 mod daemon;
 mod facts;
@@ -11,6 +12,10 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use plan::Plan;
+use sim_protocol_simulated::paths::RUNTIME_FOLDER;
+
+/// The variable that names the root folder.
+const ROOT: &str = "TIGHTLOOP_ROOT";
 
 /// Runs of a process: stacks of killed threads stay until it ends.
 const RUNS_MAX: u64 = 200;
@@ -42,6 +47,13 @@ struct Simulate {
 }
 
 fn main() -> ExitCode {
+    // where daemons are follows the seed, too
+    if [RUNTIME_FOLDER, ROOT]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some())
+    {
+        return without_folders();
+    }
     let args = Simulate::parse();
     if args.trace {
         let plan = Plan::from_seed(args.seed);
@@ -65,6 +77,16 @@ fn main() -> ExitCode {
         }
         None => ExitCode::FAILURE,
     }
+}
+
+/// Begins again without the variables that name the root folder.
+fn without_folders() -> ExitCode {
+    let program = std::env::current_exe().expect("it runs");
+    let mut again = Command::new(program);
+    again.args(std::env::args_os().skip(1));
+    again.env_remove(RUNTIME_FOLDER).env_remove(ROOT);
+    let status = again.status().expect("it runs again");
+    ExitCode::from(u8::from(!status.success()))
 }
 
 /// Runs seeds here; returns steps and commands, or none after a failure.

@@ -26,8 +26,24 @@ pub enum Act {
     Newer(u64),
     /// Asks who controls, and how frames kept their pace.
     Ask,
+    /// Counts observers.
+    Count,
+    /// Asks for something that the worlds cannot do.
+    Refused,
+    /// Lets the hook of a step give the lease back and end the wait.
+    ReleaseInside,
+    /// Lets another thread use the client so many times meanwhile.
+    Beside(u8),
+    /// Goes on with the other client of this process.
+    Swap,
     /// Records so many entries.
     Record(u8),
+    /// Takes every place of recorders at once, which are free.
+    RecordAll,
+    /// Takes the lease, and gives it back or not without a command.
+    Take(bool),
+    /// Its process is killed at the door that it passes after so many others.
+    DieAtDoor(u64),
     /// Does nothing.
     Rest(u64),
     /// Lets go of everything.
@@ -52,6 +68,10 @@ pub enum Whom {
 pub enum Fate {
     /// It is killed.
     Kill(Whom),
+    /// It is killed at the door that it passes after so many others.
+    KillAtDoor(Whom, u64),
+    /// Another process ends the daemon.
+    End,
     /// It is stopped for so many milliseconds.
     Stop(Whom, u64),
     /// Another client begins, with the acts of this one.
@@ -79,8 +99,12 @@ pub struct Plan {
     pub failing: u32,
     /// Notifications in a million that are lost.
     pub dropping: u32,
+    /// Doors in a million behind which a thread loses its core for a while.
+    pub preempting: u32,
     /// How late sleepers wake, at most [µs].
     pub lateness: u64,
+    /// How long a reset takes [ms].
+    pub slow: u64,
 }
 
 impl Plan {
@@ -97,7 +121,13 @@ impl Plan {
                 .collect(),
             failing: *rng.choice(&[0, 0, 0, 50, 500, 5000]).unwrap_or(&0),
             dropping: *rng.choice(&[0, 0, 10_000, 200_000]).unwrap_or(&0),
+            preempting: *rng.choice(&[0, 0, 200, 3000]).unwrap_or(&0),
             lateness: *rng.choice(&[100, 1000, 20_000]).unwrap_or(&100),
+            slow: if rng.u32(0..3) == 0 {
+                rng.u64(1..3000)
+            } else {
+                0
+            },
         }
     }
 
@@ -114,6 +144,12 @@ impl Plan {
         }
         if self.dropping > 0 {
             push(&|plan| plan.dropping = 0);
+        }
+        if self.preempting > 0 {
+            push(&|plan| plan.preempting = 0);
+        }
+        if self.slow > 0 {
+            push(&|plan| plan.slow = 0);
         }
         for index in 0..self.fates.len() {
             push(&|plan| {
@@ -144,13 +180,23 @@ impl Plan {
 }
 
 fn acts(rng: &mut Rng) -> Vec<Act> {
-    let begin = [Act::Rest(rng.u64(0..300)), Act::Attach(rng.u64(0..2000))];
-    let more = (0..rng.usize(1..12)).map(|_| act(rng)).collect::<Vec<_>>();
-    begin.into_iter().chain(more).collect()
+    let mut acts = vec![Act::Rest(rng.u64(0..300))];
+    if rng.u32(0..3) == 0 {
+        acts.push(Act::DieAtDoor(doors(rng)));
+    }
+    acts.push(Act::Attach(rng.u64(0..2000)));
+    acts.extend((0..rng.usize(1..12)).map(|_| act(rng)));
+    acts
+}
+
+/// Doors from one file to the next, of one call, or of a longer life.
+fn doors(rng: &mut Rng) -> u64 {
+    let most = *rng.choice(&[40, 400, 1500, 6000]).unwrap_or(&40);
+    rng.u64(1..=most)
 }
 
 fn act(rng: &mut Rng) -> Act {
-    match rng.u32(0..100) {
+    match rng.u32(0..135) {
         0..30 => Act::Steps(rng.u8(1..12)),
         30..36 => Act::SendRecv(rng.u64(0..30)),
         36..42 => Act::Hold(rng.u64(0..100)),
@@ -165,7 +211,14 @@ fn act(rng: &mut Rng) -> Act {
         82..91 => Act::Rest(rng.u64(0..300)),
         91..95 => Act::Detach,
         95..99 => Act::Attach(rng.u64(0..2000)),
-        _ => Act::Shutdown,
+        99..100 => Act::Shutdown,
+        100..102 => Act::Count,
+        102..105 => Act::Refused,
+        105..109 => Act::ReleaseInside,
+        109..118 => Act::Beside(rng.u8(1..=120)),
+        118..125 => Act::Swap,
+        125..131 => Act::Take(rng.bool()),
+        _ => Act::DieAtDoor(doors(rng)),
     }
 }
 
@@ -175,7 +228,10 @@ fn fate(rng: &mut Rng, clients: usize) -> Fate {
         6..9 => Whom::Daemon,
         _ => Whom::Owner,
     };
-    match rng.u32(0..100) {
+    match rng.u32(0..130) {
+        100..125 if whom != Whom::Owner => Fate::KillAtDoor(whom, doors(rng)),
+        100..125 => Fate::Kill(whom),
+        125..130 => Fate::End,
         0..35 => Fate::Kill(whom),
         35..60 => Fate::Stop(
             whom,

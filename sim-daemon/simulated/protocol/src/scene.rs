@@ -9,10 +9,10 @@ use sim_machine::system::signals;
 use sim_machine::thread::sleep;
 use sim_machine::time::{jump, now};
 use sim_machine::{Outcome, Run, note};
-use sim_protocol_simulated::{AttachOptions, ProtocolError, keep_waiting, stop, sweep};
+use sim_protocol_simulated::{ProtocolError, sweep};
 
 use crate::client::Actor;
-use crate::daemon::{self, NAME, ROOT};
+use crate::daemon::{self, root};
 use crate::facts::{Facts, kinds_of_files};
 use crate::plan::{Act, Fate, Plan, Whom};
 
@@ -33,12 +33,13 @@ const SHARED: u64 = 1 << 30;
 
 /// Carries out a plan.
 pub fn run(plan: &Plan, trace: bool) -> (Outcome, u64) {
-    let facts = Facts::default();
+    let facts = Facts::for_plan(plan);
     let (seen, carried) = (facts.clone(), plan.clone());
     let run = Run {
         seed: plan.seed,
         failing: plan.failing,
         dropping: plan.dropping,
+        preempting: plan.preempting,
         lateness: 1000 * plan.lateness,
         steps_max: STEPS_MAX,
         trace,
@@ -92,7 +93,8 @@ impl Cast<'_> {
                 let served = daemon::run(&own, owner.pid);
                 let may_fail = failing || own.was_squeezed(began);
                 match served {
-                    Ok(()) | Err(ProtocolError::NameTaken { .. }) => {}
+                    Ok(()) => own.ends(may_fail),
+                    Err(ProtocolError::NameTaken { .. }) => {}
                     Err(error) => assert!(may_fail, "the daemon ends: {error}"),
                 }
             });
@@ -105,9 +107,9 @@ impl Cast<'_> {
     }
 
     fn begin(&self, number: usize) -> Handle {
-        let (facts, failing) = (self.facts.clone(), self.plan.failing > 0);
+        let facts = self.facts.clone();
         let acts: Vec<Act> = self.plan.clients[number].clone();
-        process::start(move || Actor::new(&facts, failing).play(&acts))
+        process::start(move || Actor::new(&facts).play(&acts))
     }
 
     fn who(&self, whom: Whom) -> Option<Handle> {
@@ -126,12 +128,23 @@ impl Cast<'_> {
                     .then(|| self.facts.daemon())
                     .flatten();
                 who.kill();
+                owned
+                    .iter()
+                    .for_each(|daemon| self.facts.ask_daemon(*daemon));
                 self.orphans.extend(owned.map(|daemon| (daemon, now())));
+            }
+            Fate::KillAtDoor(whom, doors) => {
+                let who = self.who(whom);
+                who.into_iter().for_each(|who| who.kill_at_door(doors));
+            }
+            Fate::End => {
+                let facts = self.facts.clone();
+                process::start(move || Actor::new(&facts).end());
             }
             Fate::Stop(whom, time) => {
                 let Some(who) = self.who(whom) else { return };
                 who.stop();
-                self.facts.stop(1_000_000 * time);
+                self.facts.stop(who.pid, 1_000_000 * time);
                 let again = Duration::from_millis(time);
                 sim_machine::at(again, move || who.resume());
             }
@@ -144,9 +157,10 @@ impl Cast<'_> {
             Fate::Launch => self.launch(),
             Fate::Signal => {
                 let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
-                daemon
-                    .into_iter()
-                    .for_each(|daemon| signals::send(daemon.pid));
+                if let Some(daemon) = daemon {
+                    self.facts.ask_daemon(daemon);
+                    signals::send(daemon.pid);
+                }
             }
             Fate::Jump(seconds) => jump(1_000_000_000 * seconds),
             Fate::Squeeze(kibibytes, time) => {
@@ -186,35 +200,37 @@ impl Cast<'_> {
             assert!(waited < most, "a client never ends");
         }
         sim_machine::calm();
-        // by then nobody is stopped and shared memory has room
-        sleep(Duration::from_secs(7));
+        self.facts.calm();
+        let all = self.clients.iter().copied().chain(self.facts.daemons());
+        all.for_each(|process| process.kill_at_door(u64::MAX));
+        // nobody is stopped any more, shared memory has room, and the daemon has seen who is dead
+        let calm = self.facts.calm_at().saturating_sub(now());
+        sleep(Duration::from_nanos(calm) + self.facts.slow() + Duration::from_secs(1));
         let overwritten = sim_machine::overwritten();
         assert_eq!(
             overwritten, 0,
             "frames were overwritten that somebody holds"
         );
         self.last_client();
-        self.in_a_process(|| {
-            let options = AttachOptions {
-                root: Some(ROOT.into()),
-                wait: Duration::ZERO,
-            };
-            match stop(NAME, &options, &mut keep_waiting()) {
-                Ok(()) | Err(ProtocolError::NoDaemon { .. }) => {}
-                Err(error) => panic!("the daemon cannot be stopped: {error}"),
-            }
-            sweep(Some(Path::new(ROOT))).expect("nothing is in the way");
+        let facts = self.facts.clone();
+        self.in_a_process(move || {
+            Actor::new(&facts).end();
+            sweep(Some(&root())).expect("nothing is in the way");
         });
         if self.plan.failing > 0 || !self.plan.fates.is_empty() {
             // a folder whose daemon was killed before it was marked goes when it is old, by a calendar that was not set back
             jump(1_000_000_000 * JUMPS_MAX);
             sleep(OLD);
-            self.in_a_process(|| sweep(Some(Path::new(ROOT))).expect("nothing is in the way"));
+            self.in_a_process(|| sweep(Some(&root())).expect("nothing is in the way"));
         }
-        let left = fs::list(Path::new("/dev/shm"));
-        assert!(left.is_empty(), "left behind: {left:?}");
-        let left = fs::list(Path::new(ROOT));
-        assert!(left.is_empty(), "left behind: {left:?}");
+        // who looks for daemons makes their folder
+        let mut left = fs::list(Path::new("/dev/shm"));
+        left.retain(|path| *path != root());
+        let named = fs::list(&root());
+        assert!(
+            left.is_empty() && named.is_empty(),
+            "left behind: {left:?} {named:?}"
+        );
     }
 
     /// A daemon that lives serves the next client, and keeps nothing of those who went.
@@ -226,7 +242,11 @@ impl Cast<'_> {
         let (before, commands) = (lives(), self.facts.commands());
         let facts = self.facts.clone();
         self.in_a_process(move || {
-            Actor::new(&facts, false).play(&[Act::Attach(5000), Act::Steps(3), Act::Observe(1)]);
+            let acts = [Act::Attach(5000), Act::Steps(3), Act::Observe(1)];
+            Actor::new(&facts).play(&acts);
+            if before.is_some() {
+                Actor::new(&facts).play(&[Act::Attach(5000), Act::RecordAll]);
+            }
         });
         sleep(CLEAN);
         if before.is_some() && before == lives() {
