@@ -74,7 +74,7 @@ def test_blocks_that_do_not_run_say_why():
         "needs a Ray cluster and stable-baselines3": 1,
         "needs a Vulkan driver": 1,
         "needs a browser": 1,
-        "needs a checkout": 13,
+        "needs a checkout": 14,
         "needs a compiler": 3,
         "needs a network": 2,
         "needs a notebook": 1,
