@@ -1,5 +1,8 @@
 //! Every seed of the fuzz targets, and every input that once broke a reader, goes through its reader on any toolchain.
 
+// each of the two fuzz packages has the module that writes files
+#![allow(clippy::duplicate_mod)]
+
 #[path = "fuzz/src/lib.rs"]
 mod readers;
 #[path = "fuzz/simulation/src/lib.rs"]
