@@ -173,14 +173,15 @@ fn what_is_left_of_a_root_folder_that_is_gone_is_swept_and_the_living_are_spared
     let (gone, living) = (root("gone"), root("living"));
     let dead = DaemonPaths::new(Some(&gone), "dead").unwrap();
     private_folder(&dead.shared_folder()).unwrap();
+    let shared = dead.shared_folder().join("00000001_5.data");
+    fs::write(&shared, "x").unwrap();
+    fs::remove_dir(&gone).unwrap();
+    // last: from here on the sweep of another test may take it, too
     fs::write(
         dead.shared_folder().join(PLACE),
         format!("{}\ndead", dead.root().display()),
     )
     .unwrap();
-    let shared = dead.shared_folder().join("00000001_5.data");
-    fs::write(&shared, "x").unwrap();
-    fs::remove_dir(&gone).unwrap();
     let paths = DaemonPaths::new(Some(&living), "living").unwrap();
     let daemon_lock = DaemonLock::take(&paths).unwrap();
     fs::remove_dir_all(&living).unwrap();
