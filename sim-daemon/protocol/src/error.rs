@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use crate::doors::system::files::{free_bytes, shared_memory};
 use crate::doors::system::{open_files, process};
-
 use crate::memory::problem::{FREE_MIN, Problem, folder_cure, other_problem, take_problem};
 
 /// Everything that can go wrong for a client. The daemon's refusals arrive as [`ProtocolError::CommandRefused`].

@@ -3,12 +3,12 @@
 mod observer;
 mod on_device;
 
-use crate::doors::sync::Arc;
-use crate::doors::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use observer::Observer;
 
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::{AtomicBool, Ordering};
 use crate::journal::Journal;
 use crate::lease::controller::Controller;
 use crate::memory::forked::Maker;

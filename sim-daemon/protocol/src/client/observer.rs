@@ -1,10 +1,10 @@
 //! The observing end of a client: newest frames, nothing asked of the daemon.
 
-use crate::doors::sync::Arc;
-use crate::doors::time::Instant;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use crate::doors::sync::Arc;
+use crate::doors::time::Instant;
 use crate::lease::controller::check_table;
 use crate::memory::frame::{Alive, FrameSample};
 use crate::memory::guard::guarded;

@@ -3,13 +3,12 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
+use super::orphans::orphans;
+use super::worlds::S;
 use crate::doors::exists;
 use crate::doors::iceoryx2::config::Config;
 use crate::doors::iceoryx2::node::NodeView;
 use crate::doors::iceoryx2::prelude::{CallbackProgression, Node, NodeState};
-
-use super::orphans::orphans;
-use super::worlds::S;
 
 /// Every so many looks for dead clients, one for files without an owner.
 const LOOKS: u32 = 5;

@@ -1,14 +1,13 @@
 //! Journals: to each recorder what its daemon has carried out. Without one, this is a look at an empty list.
 
-use crate::doors::time::Instant;
 use std::time::Duration;
-
-use crate::doors::iceoryx2::identifiers::UniqueClientId;
-use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
-use crate::doors::iceoryx2::prelude::{Node, PortFactory};
 
 use super::Inbox;
 use super::worlds::S;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
+use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
+use crate::doors::iceoryx2::prelude::{Node, PortFactory};
+use crate::doors::time::Instant;
 use crate::journal::digest::{digest, digests_of};
 use crate::memory::guard::guarded;
 use crate::memory::loaned;

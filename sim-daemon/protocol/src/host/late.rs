@@ -1,11 +1,10 @@
 //! Steps that the daemon makes itself: no command came and the worlds keep their pace, or a command asks for several.
 
-use crate::doors::time::Instant;
-
 use super::inbox::Inbox;
 use super::journal::Occasion;
 use super::state::{State, header};
 use super::worlds::Worlds;
+use crate::doors::time::Instant;
 use crate::wire::command::{Command, Values};
 use crate::{CommandHeader, Op};
 

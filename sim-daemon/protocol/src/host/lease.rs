@@ -1,13 +1,12 @@
 //! The services of one lease, at the daemon.
 
-use crate::doors::sync::{Arc, Weak};
-use crate::doors::time::Instant;
 use std::time::Duration;
 
+use super::worlds::S;
 use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
 use crate::doors::iceoryx2::prelude::{Node, PortFactory};
-
-use super::worlds::S;
+use crate::doors::sync::{Arc, Weak};
+use crate::doors::time::Instant;
 use crate::memory::mapping::{self, Pages};
 use crate::transport::budget::slot_bytes;
 use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher, Waker};

@@ -16,11 +16,12 @@ mod tests;
 pub mod watch;
 mod worlds;
 
+use std::time::Duration;
+
 use crate::doors;
 use crate::doors::sync::Arc;
 use crate::doors::sync::atomic::{AtomicBool, Ordering};
 use crate::doors::time::Instant;
-use std::time::Duration;
 
 pub use cleanup::ClientCleanup;
 pub use inbox::{Inbox, Numbers};

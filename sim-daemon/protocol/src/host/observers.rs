@@ -1,12 +1,11 @@
 //! Observers: at a limited rate they get the first worlds of a frame, with the state from which these could go on.
 
-use crate::doors::time::Instant;
 use std::time::Duration;
 
+use super::worlds::{S, Worlds};
 use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
 use crate::doors::iceoryx2::prelude::{Node, PortFactory};
-
-use super::worlds::{S, Worlds};
+use crate::doors::time::Instant;
 use crate::memory::guard::guarded;
 use crate::memory::loaned;
 use crate::transport::budget;

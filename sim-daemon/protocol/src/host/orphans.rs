@@ -1,10 +1,10 @@
 //! Files in a daemon's folder that no node owns any more.
 
-use crate::doors::fs::{metadata, read_dir};
 use std::collections::HashSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use crate::doors::fs::{metadata, read_dir};
 use crate::doors::system::files::is_write_only;
 use crate::doors::system::process;
 

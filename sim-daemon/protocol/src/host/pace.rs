@@ -1,9 +1,8 @@
 //! When frames are due, and how well they kept to it.
 
-use crate::doors::time::Instant;
-
 use hdrhistogram::Histogram;
 
+use crate::doors::time::Instant;
 use crate::waiting::clock::{self, Alarm};
 use crate::wire::description::{Description, Late, Pace};
 use crate::wire::timing::{Percentiles, Timing};

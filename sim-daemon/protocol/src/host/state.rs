@@ -1,12 +1,6 @@
 //! What a host looks after: leases, control requests, observers, and the answers to commands.
 
-use crate::doors::sync::Arc;
-use crate::doors::sync::atomic::{AtomicBool, Ordering};
-use crate::doors::time::Instant;
 use std::time::Duration;
-
-use crate::doors::iceoryx2::identifiers::UniqueClientId;
-use crate::doors::iceoryx2::prelude::Node;
 
 use super::Inbox;
 use super::handover::Handover;
@@ -15,6 +9,11 @@ use super::lease::Lease;
 use super::observers::Observers;
 use super::pace::Pacer;
 use super::worlds::{Next, S, Worlds};
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
+use crate::doors::iceoryx2::prelude::Node;
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::{AtomicBool, Ordering};
+use crate::doors::time::Instant;
 use crate::lease::device_memory::{Door, Visitor};
 use crate::memory::guard::guarded;
 use crate::memory::loaned;

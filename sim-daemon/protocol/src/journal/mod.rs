@@ -2,14 +2,13 @@
 
 pub mod digest;
 
-use crate::doors::sync::Arc;
-use crate::doors::time::Instant;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use crate::doors::iceoryx2::sample::Sample;
+use crate::doors::sync::Arc;
 use crate::doors::system::files::shared_memory;
-
+use crate::doors::time::Instant;
 use crate::memory::guard::guarded;
 use crate::memory::loaned;
 use crate::memory::port::Port;

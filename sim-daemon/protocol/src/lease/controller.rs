@@ -1,15 +1,14 @@
 //! The controlling end of a client: one lease, one command in flight.
 
-use crate::doors::sync::Arc;
-use crate::doors::sync::atomic::Ordering;
-use crate::doors::time::Instant;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use crate::doors::iceoryx2::prelude::PortFactory;
+use crate::doors::sync::Arc;
+use crate::doors::sync::atomic::Ordering;
 use crate::doors::system::files::shared_memory;
 use crate::doors::system::process;
-
+use crate::doors::time::Instant;
 use crate::lease::device_memory::{self, Delivery};
 use crate::lease::heartbeat::HeartbeatThread;
 use crate::memory::frame::{Alive, FrameSample};

@@ -1,9 +1,9 @@
 //! Heartbeats of a controller: they confirm its lease.
 
-use crate::doors::sync::{Arc, Condvar, Mutex};
-use crate::doors::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::doors::sync::{Arc, Condvar, Mutex};
+use crate::doors::thread::JoinHandle;
 use crate::presence::connection::Connection;
 use crate::waiting::turn::lock;
 

@@ -1,13 +1,12 @@
 //! A frame: one sample from the daemon, owned, with its checked field table.
 
-use crate::doors::sync::atomic::{AtomicUsize, Ordering};
-use crate::doors::sync::{Arc, Mutex};
 use std::any::Any;
 use std::fmt;
 use std::mem::ManuallyDrop;
 
 use crate::doors::iceoryx2::sample::Sample;
-
+use crate::doors::sync::atomic::{AtomicUsize, Ordering};
+use crate::doors::sync::{Arc, Mutex};
 use crate::memory::forked::Maker;
 use crate::memory::port::Port;
 use crate::memory::service::AnyThread;

@@ -3,13 +3,12 @@
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
+use crate::Line;
 use crate::doors::iceoryx2::port::publisher::Publisher;
 use crate::doors::iceoryx2::port::{LoanError, SendError};
 use crate::doors::iceoryx2::prelude::{Service, ZeroCopySend};
 use crate::doors::iceoryx2::sample::Sample;
 use crate::doors::iceoryx2::sample_mut_uninit::SampleMutUninit;
-
-use crate::Line;
 use crate::memory::guard::guarded;
 use crate::memory::mapping;
 

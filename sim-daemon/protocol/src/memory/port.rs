@@ -5,7 +5,6 @@ use std::mem::ManuallyDrop;
 use std::ops::{Deref, DerefMut};
 
 use crate::doors::iceoryx2::config::Config;
-
 use crate::memory::guard::guarded;
 use crate::memory::mapping;
 use crate::memory::storage;

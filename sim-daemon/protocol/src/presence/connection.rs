@@ -1,13 +1,12 @@
 //! How each part of a client reaches the daemon: node, control requests, wake-up.
 
+use std::time::Duration;
+
+use crate::doors::iceoryx2::prelude::Node;
 use crate::doors::sync::Mutex;
 use crate::doors::sync::atomic::AtomicBool;
 use crate::doors::sync::mpsc::{self, RecvTimeoutError};
 use crate::doors::time::Instant;
-use std::time::Duration;
-
-use crate::doors::iceoryx2::prelude::Node;
-
 use crate::memory::guard::guarded;
 use crate::memory::mapping;
 use crate::memory::port::Port;

@@ -1,15 +1,14 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
-use crate::doors::exists;
-use crate::doors::fs::{self, File};
-use crate::doors::sync::{Arc, Mutex, PoisonError};
-use crate::doors::time::Instant;
 use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::doors::exists;
+use crate::doors::fs::{self, File};
+use crate::doors::sync::{Arc, Mutex, PoisonError};
 use crate::doors::system::files::{self, private, shared_memory};
-
+use crate::doors::time::Instant;
 use crate::presence::paths::{
     DaemonPaths, Presence, STARTING, default_root, names_with_lock, private_folder,
 };

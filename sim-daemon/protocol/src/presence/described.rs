@@ -1,13 +1,12 @@
 //! What a daemon says of itself in files of its folder: its description, which may be large and which every client reads once,
 //! that its shared memory is damaged, and which ports of clients it cannot reach.
 
-use crate::doors::fs;
 use std::io::{Read, Write};
 use std::path::PathBuf;
 
 use crate::doors::exists;
+use crate::doors::fs;
 use crate::doors::system::files::private;
-
 use crate::presence::paths::DaemonPaths;
 use crate::{Description, ProtocolError};
 

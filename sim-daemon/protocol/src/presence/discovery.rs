@@ -1,9 +1,9 @@
 //! Looking for a daemon by its name.
 
-use crate::doors::time::Instant;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::doors::time::Instant;
 use crate::presence::paths::{Beacon, DaemonPaths, Presence, running};
 use crate::waiting::hook::Hook;
 use crate::{PROTOCOL_VERSION, ProtocolError};

@@ -1,10 +1,10 @@
 //! Is the daemon that we attached to still there?
 
-use crate::doors::fs::File;
-use crate::doors::sync::Arc;
 use std::time::Duration;
 
 use crate::ProtocolError;
+use crate::doors::fs::File;
+use crate::doors::sync::Arc;
 use crate::presence::described;
 use crate::presence::paths::{Beacon, DaemonPaths, Presence};
 

@@ -11,17 +11,16 @@
 //! A process that can take the lock may remove the rest. SHARED is `/dev/shm` on Linux, `/private/var/tmp` on macOS and the user's
 //! temporary folder on Windows, whatever ROOT is, since the path of a Unix socket is limited to 107 bytes.
 
-use crate::doors::fs::{self, File, Metadata};
-use crate::doors::sync::OnceLock;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use crate::ProtocolError;
+use crate::doors::fs::{self, File, Metadata};
 use crate::doors::iceoryx2::config::Config;
 use crate::doors::iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString};
-use crate::doors::system::files::{self, exposed, make_private_folder, own_folder_name, private};
-
-use crate::ProtocolError;
+use crate::doors::sync::OnceLock;
 pub use crate::doors::system::files::shared_memory;
+use crate::doors::system::files::{self, exposed, make_private_folder, own_folder_name, private};
 use crate::wire::hash::Fnv;
 
 /// The variable that names the folder of a login session.

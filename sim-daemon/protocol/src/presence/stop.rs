@@ -1,9 +1,9 @@
 //! Stopping a daemon that may be too busy to answer: by a file that its watchdog sees.
 
-use crate::doors::time::Instant;
 use std::time::Duration;
 
 use crate::ProtocolError;
+use crate::doors::time::Instant;
 use crate::presence::daemon_lock::remove_own_root;
 use crate::presence::discovery::{AttachOptions, find};
 use crate::presence::paths::{DaemonPaths, Presence};

@@ -1,11 +1,10 @@
 //! Shared memory of a daemon: how much it will take, whether that is there, and taking it for certain.
 
-use crate::doors::fs::{self, OpenOptions};
 use std::io::ErrorKind;
 use std::path::Path;
 
+use crate::doors::fs::{self, OpenOptions};
 use crate::doors::system::files::{free_bytes, shared_memory};
-
 use crate::transport::{COMMAND_SLOTS, frame_slots, watch_slots};
 use crate::wire::command::command_bytes;
 use crate::{Description, Dtype, ProtocolError, Table};

@@ -1,14 +1,13 @@
 //! The service `control`: requests of clients, and the daemon's responses.
 
+use super::{CLIENTS_MAX, service_name, unreached};
+use crate::ProtocolError;
 use crate::doors::iceoryx2::active_request::ActiveRequest;
 use crate::doors::iceoryx2::identifiers::UniqueClientId;
 use crate::doors::iceoryx2::port::client::Client as ControlClient;
 use crate::doors::iceoryx2::port::server::Server;
 use crate::doors::iceoryx2::prelude::*;
 use crate::doors::iceoryx2::service::port_factory::request_response;
-
-use super::{CLIENTS_MAX, service_name, unreached};
-use crate::ProtocolError;
 use crate::memory::port::Port;
 use crate::wire::control::{REQUEST_MAX, RESPONSE_MAX};
 

@@ -5,9 +5,10 @@ pub(crate) mod budget;
 mod control;
 pub(crate) mod unreached;
 
-use crate::doors::sync::Once;
 use std::fmt::Debug;
 use std::path::Path;
+
+use attached::holders;
 
 use crate::doors::fs;
 use crate::doors::iceoryx2::config::Config;
@@ -18,8 +19,7 @@ use crate::doors::iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError
 use crate::doors::iceoryx2::prelude::*;
 use crate::doors::iceoryx2::service::builder::event::EventOpenError;
 use crate::doors::iceoryx2::service::port_factory::{event, publish_subscribe};
-
-use attached::holders;
+use crate::doors::sync::Once;
 pub(crate) use control::{
     Asked, ControlService, Requester, Responder, create_control, is_present, requester, responder,
 };

@@ -3,11 +3,10 @@
 
 use std::cell::RefCell;
 
+use crate::ProtocolError;
 use crate::doors::iceoryx2::port::{
     DegradationAction, DegradationCause, DegradationFn, DegradationInfo,
 };
-
-use crate::ProtocolError;
 
 /// Most that one thread keeps, the newest: threads of a client that only send look at none.
 const KEPT: usize = 64;

@@ -4,10 +4,10 @@
 //! and leaves them there. Each side therefore says where it runs; when that is the same core, nobody spins, and the daemon
 //! moves away once in a while.
 
-use crate::doors::time::Instant;
 use std::time::Duration;
 
 use crate::doors::system::cores;
+use crate::doors::time::Instant;
 
 /// Asking where we run is a system call: once in so many commands is enough.
 const ASK_PERIOD: u32 = 16;

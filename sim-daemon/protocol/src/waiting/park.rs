@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
+use crate::ProtocolError;
 use crate::doors::iceoryx2::port::listener::{Listener, ListenerWaitError};
 use crate::doors::iceoryx2::prelude::Service;
 use crate::doors::iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
 use crate::doors::system::files::wait_readable;
-
-use crate::ProtocolError;
 
 /// Sleeps until notified or for `timeout`, and drains what was notified. A signal ends it early.
 ///

@@ -1,10 +1,10 @@
 //! Taking turns on a value: a call has it for itself, but no lock, while it waits and the caller's own code may run.
 
-use crate::doors::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use crate::doors::thread::{self, ThreadId};
 use std::ops::{Deref, DerefMut};
 
 use crate::ProtocolError;
+use crate::doors::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use crate::doors::thread::{self, ThreadId};
 use crate::waiting::SLICE;
 use crate::waiting::hook::Hook;
 

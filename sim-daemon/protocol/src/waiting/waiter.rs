@@ -1,13 +1,12 @@
 //! How to wait: spin while the answer is likely to come soon and a core is free for it, else sleep.
 
-use crate::doors::time::Instant;
 use std::time::Duration;
 
+use crate::ProtocolError;
 use crate::doors::iceoryx2::port::listener::Listener;
 use crate::doors::iceoryx2::prelude::Service;
 use crate::doors::iceoryx2_bb_posix::file_descriptor::FileDescriptorBased;
-
-use crate::ProtocolError;
+use crate::doors::time::Instant;
 use crate::waiting::SLICE;
 use crate::waiting::clock::{self, Alarm};
 use crate::waiting::park::park;
