@@ -3,6 +3,7 @@
 //! A request to stop sets the flag that loops look at. A daemon that is not gone soon after, since one long piece of work
 //! keeps it, is ended at once: its files go first.
 
+use std::convert::Infallible;
 use std::time::Duration;
 
 use crate::doors::sync::atomic::{AtomicBool, Ordering};
@@ -59,7 +60,7 @@ impl Places {
 
 impl Watch {
     /// Looks until the other end of `ended` is gone. `end` ends the process, for the reason given.
-    pub fn run(&self, ended: &Receiver<()>, end: impl Fn(&str)) {
+    pub fn run(&self, ended: &Receiver<()>, end: impl Fn(&str) -> Infallible) {
         // when somebody first asked, and when the end is due
         let mut asked: Option<(Instant, Instant)> = None;
         while ended.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
