@@ -141,7 +141,8 @@ impl Client {
     /// [`ProtocolError::DaemonLost`] and its kin, [`ProtocolError::Forked`].
     pub fn controller(&self, hook: Hook<'_>) -> Result<Option<u32>, ProtocolError> {
         self.check_process()?;
-        self.connection.holder(hook)
+        let holder = self.connection.holder(hook)?;
+        Ok(holder.map(|(pid, _)| pid))
     }
 
     /// Whether this client holds the lease, as far as it knows. In a forked child it does not.

@@ -122,9 +122,12 @@ impl State {
         while let Ok(Some(active)) = self.responder.receive() {
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => Response::Described,
-                Ok(Request::Controller) => Response::Controller {
-                    pid: self.lease.as_mut().and_then(Lease::present_holder),
-                },
+                Ok(Request::Controller) => {
+                    let pid = self.lease.as_mut().and_then(Lease::present_holder);
+                    let epoch =
+                        pid.map_or(0, |_| self.lease.as_ref().map_or(0, |lease| lease.epoch));
+                    Response::Controller { pid, epoch }
+                }
                 // a release that waits unread came before: the requests of several clients come in no order
                 Ok(Request::Acquire { pid }) => {
                     later.push((active, pid));

@@ -86,11 +86,27 @@ impl Controller {
         frames: &Arc<Alive>,
         hook: Hook<'_>,
     ) -> Result<Controller, ProtocolError> {
+        // what an earlier call did not wait for may be granted yet, to nobody
+        let abandoned = &connection.abandoned;
+        let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
+        let acquired = Controller::ask(connection, description, frames, was_abandoned, hook);
+        if let Err(ProtocolError::Interrupted | ProtocolError::Timeout { .. }) = acquired {
+            abandoned.store(true, Ordering::Relaxed);
+        }
+        acquired
+    }
+
+    /// Asks for a lease until there is one, or nobody can tell when.
+    fn ask(
+        connection: &Arc<Connection>,
+        description: &Arc<Description>,
+        frames: &Arc<Alive>,
+        was_abandoned: bool,
+        hook: Hook<'_>,
+    ) -> Result<Controller, ProtocolError> {
         // from the first answer on, since a daemon at long work answers late
         let mut answered = None;
-        // what an earlier call did not wait for may be granted yet, to nobody
-        let (own_pid, abandoned) = (crate::doors::process::id(), &connection.abandoned);
-        let was_abandoned = abandoned.swap(false, Ordering::Relaxed);
+        let own_pid = crate::doors::process::id();
         loop {
             let error = match ask_for_lease(connection, hook) {
                 Ok(epoch) => match open_lease(connection, description, frames, epoch, hook) {
@@ -107,10 +123,6 @@ impl Controller {
                 ProtocolError::LeaseHeld { pid, .. } => {
                     process::is_gone(pid, connection.peer.beacon.pid)
                         || was_abandoned && pid == own_pid && answered.elapsed() < ABANDONED_MAX
-                }
-                ProtocolError::Interrupted | ProtocolError::Timeout { .. } => {
-                    abandoned.store(true, Ordering::Relaxed);
-                    false
                 }
                 _ => false,
             };
@@ -352,9 +364,9 @@ fn open_lease(
     }
     let controller = Controller::new(connection, description, frames, epoch, ports?);
     // the daemon has seen the ports now, unless it took the lease back while they were opened
-    match connection.holder(hook)? == Some(crate::doors::process::id()) {
-        true => Ok(controller),
-        false => Err(connection.peer.lease_lost()),
+    match connection.holder(hook)? {
+        Some((_, present)) if present == epoch => Ok(controller),
+        _ => Err(connection.peer.lease_lost()),
     }
 }
 

@@ -61,6 +61,9 @@ pub enum Response {
     Controller {
         /// Process in control, if any.
         pid: Option<u32>,
+        /// Its lease; 0 without one.
+        #[serde(default)]
+        epoch: u64,
     },
     /// Control is yours, through the services of this epoch.
     Granted {
