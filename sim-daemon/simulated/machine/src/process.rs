@@ -13,6 +13,8 @@ pub(crate) struct Process {
     pub(crate) since: u64,
     /// Doors that it passes yet.
     pub(crate) doors: u64,
+    /// Changes that it makes yet.
+    pub(crate) changes: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +56,20 @@ impl World {
             process.doors -= 1;
             process.doors == 0
         })
+    }
+
+    /// Counts changes of the calling process; it is killed at the door behind the last one.
+    pub(crate) fn count_changes(&mut self, changes: u64) {
+        if changes == 0 {
+            return;
+        }
+        let pid = self.process();
+        if let Some(process) = self.processes.get_mut(&pid) {
+            process.changes = process.changes.saturating_sub(changes);
+            if process.changes == 0 {
+                process.doors = process.doors.min(1);
+            }
+        }
     }
 
     fn serial(&self, pid: u32) -> u64 {
@@ -119,10 +135,19 @@ impl Handle {
 
     /// Kills it at the door that it passes after so many others, one or more.
     pub fn kill_at_door(self, doors: u64) {
+        self.doom(doors, u64::MAX);
+    }
+
+    /// Kills it right after so many changes that others can see, one or more: of files, or of who is at the transport.
+    pub fn kill_at_change(self, changes: u64) {
+        self.doom(u64::MAX, changes);
+    }
+
+    fn doom(self, doors: u64, changes: u64) {
         if self.is_alive() {
             with(|world| {
                 if let Some(process) = world.processes.get_mut(&self.pid) {
-                    process.doors = doors;
+                    (process.doors, process.changes) = (doors, changes);
                 }
             });
         }
@@ -154,7 +179,7 @@ pub fn start(main: impl FnOnce() + Send + 'static) -> Handle {
         let (pid, parent) = (world.number(), world.process());
         world.serials += 1;
         let (serial, state) = (world.serials, State::Running);
-        let (since, doors) = (world.now, u64::MAX);
+        let (since, doors, changes) = (world.now, u64::MAX, u64::MAX);
         world.processes.insert(
             pid,
             Process {
@@ -163,6 +188,7 @@ pub fn start(main: impl FnOnce() + Send + 'static) -> Handle {
                 state,
                 since,
                 doors,
+                changes,
             },
         );
         world.line(|| format!("starts process {pid}"));

@@ -70,7 +70,10 @@ pub(crate) fn with<R>(call: impl FnOnce(&mut World) -> R) -> R {
     WORLD.with_borrow_mut(|world| {
         let world = world.as_mut().expect("a run is on");
         world.files.clock = world.calendar();
-        call(world)
+        let before = world.files.changes;
+        let result = call(world);
+        world.count_changes(world.files.changes - before);
+        result
     })
 }
 

@@ -69,10 +69,11 @@ impl Actor {
         match act {
             Act::Attach(wait) => self.attach(Duration::from_millis(wait)),
             Act::DieAtDoor(doors) => Handle::this().kill_at_door(doors),
+            Act::DieAtChange(changes) => Handle::this().kill_at_change(changes),
             Act::Rest(time) => sleep(Duration::from_millis(time)),
             Act::Detach => self.detach(),
             Act::Swap => std::mem::swap(&mut self.seat, &mut self.other),
-            Act::Beside(count) => self.begin_beside(count),
+            Act::Beside(count, steps_alone) => self.begin_beside(count, steps_alone),
             _ => {
                 let Some(seat) = &self.seat else {
                     return;
@@ -97,7 +98,7 @@ impl Actor {
     }
 
     /// Lets another thread use the client, which it holds until it is done.
-    fn begin_beside(&mut self, count: u8) {
+    fn begin_beside(&mut self, count: u8, steps_alone: bool) {
         let Some(seat) = &mut self.seat else {
             return;
         };
@@ -108,7 +109,7 @@ impl Actor {
         let (client, caller) = (Arc::clone(&seat.client), seat.caller.clone());
         let beside = move || {
             for _ in 0..count {
-                if use_beside(&client, &caller).is_none() {
+                if use_beside(&client, &caller, steps_alone).is_none() {
                     break;
                 }
             }
@@ -186,6 +187,14 @@ impl Actor {
                     drop(caller.control("release", client, || client.release(hook)));
                 }
             }
+            Act::Insist(time) => {
+                let end = now() + 1_000_000 * time;
+                while !is_there(&caller.control("acquire", client, || client.acquire(hook)))?
+                    && now() < end
+                {
+                    sleep(Duration::from_millis(20));
+                }
+            }
             Act::Release => drop(caller.control("release", client, || client.release(hook))),
             Act::Observe(count) => {
                 for _ in 0..count {
@@ -240,8 +249,9 @@ impl Actor {
             | Act::Rest(_)
             | Act::Detach
             | Act::DieAtDoor(_)
+            | Act::DieAtChange(_)
             | Act::Swap
-            | Act::Beside(_) => {
+            | Act::Beside(..) => {
                 unreachable!("they use no client here")
             }
         }
@@ -277,9 +287,10 @@ impl Actor {
 }
 
 /// Uses a client that another thread uses, too; `None` where the daemon is gone.
-fn use_beside(client: &Client, caller: &Caller) -> Option<()> {
+fn use_beside(client: &Client, caller: &Caller, steps_alone: bool) -> Option<()> {
     let hook: Hook<'_> = &mut keep_waiting();
     match random() % 16 {
+        _ if steps_alone => step_beside(client, caller)?,
         0 => drop(caller.control("release", client, || client.release(hook))),
         1 => {
             is_there(&caller.timed("latest", CALL_MAX, || client.latest(hook)))?;
@@ -292,15 +303,19 @@ fn use_beside(client: &Client, caller: &Caller) -> Option<()> {
             is_there(&caller.timed("controller", CALL_MAX, || client.controller(hook)))?;
         }
         4 => sleep(Duration::from_millis(random() % 30)),
-        _ => {
-            let frame = caller.control("step", client, || client.step(&[], hook));
-            is_there(&frame)?;
-            let head = frame.map(|frame| (*frame.header(), whole(&frame)));
-            if let Ok((head, count)) = head {
-                let id = (head.session, head.epoch, head.ack_seq);
-                caller.facts.got(id, count);
-            }
-        }
+        _ => step_beside(client, caller)?,
+    }
+    Some(())
+}
+
+fn step_beside(client: &Client, caller: &Caller) -> Option<()> {
+    let step = || client.step(&[], &mut keep_waiting());
+    let frame = caller.control("step", client, step);
+    is_there(&frame)?;
+    if let Ok(frame) = frame {
+        let head = *frame.header();
+        let id = (head.session, head.epoch, head.ack_seq);
+        caller.facts.got(id, whole(&frame));
     }
     Some(())
 }

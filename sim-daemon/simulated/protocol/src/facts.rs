@@ -69,11 +69,14 @@ struct Known {
     failing: bool,
     /// Threads lose their core, or wake late.
     uneven: bool,
+    /// None of that any more, and nobody is killed.
+    is_calm: bool,
     /// How long a reset takes [ms].
     slow: u64,
-    /// As they were launched.
-    daemons: Vec<Handle>,
-    owner: Option<Handle>,
+    /// As they were launched, each with its owner.
+    daemons: Vec<(Handle, Handle)>,
+    /// When the folder of daemons was removed last: nobody finds those from before [ns].
+    logged_out: u64,
     /// When something last happened that a wait may have to sit out [ns].
     squeezed: u64,
     commands: u64,
@@ -145,7 +148,12 @@ impl Facts {
 
     /// From now on no call fails.
     pub fn calm(&self) {
-        self.known(|known| (known.failing, known.uneven) = (false, false));
+        self.known(|known| (known.failing, known.uneven, known.is_calm) = (false, false, true));
+    }
+
+    /// Whether that was said.
+    pub fn is_calm(&self) -> bool {
+        self.known(|known| known.is_calm)
     }
 
     /// Whether calls that began then may fail.
@@ -260,7 +268,11 @@ impl Facts {
     /// One was.
     pub fn nobody_serves(&self, since: u64) {
         self.known(|known| {
-            let mut sessions = known.serving.keys();
+            let seen = known
+                .serving
+                .iter()
+                .filter(|run| run.1.1 >= known.logged_out);
+            let mut sessions = seen.map(|(session, _)| session);
             let lives = sessions.find(|session| known.lives(**session, since));
             assert!(lives.is_none(), "the daemon of run {lives:x?} lives");
         });
@@ -321,29 +333,67 @@ impl Facts {
 
     /// Notes the daemon and its owner.
     pub fn launched(&self, owner: Handle, daemon: Handle) {
-        self.known(|known| {
-            known.owner = Some(owner);
-            known.daemons.push(daemon);
-        });
+        self.known(|known| known.daemons.push((owner, daemon)));
     }
 
-    /// The daemon launched last.
+    /// The daemon launched last of those that live, or of all.
     pub fn daemon(&self) -> Option<Handle> {
-        self.known(|known| known.daemons.last().copied())
+        self.known(|known| known.last_daemon().map(|(_, daemon)| daemon))
     }
 
     /// All that were launched.
     pub fn daemons(&self) -> Vec<Handle> {
-        self.known(|known| known.daemons.clone())
+        let daemons = |known: &mut Known| known.daemons.iter().map(|(_, daemon)| *daemon).collect();
+        self.known(daemons)
     }
 
     /// Its owner.
     pub fn owner(&self) -> Option<Handle> {
-        self.known(|known| known.owner)
+        self.known(|known| known.last_daemon().map(|(owner, _)| owner))
+    }
+
+    /// The daemon that serves whoever comes, and that nobody asked to end.
+    pub fn server(&self) -> Option<Handle> {
+        self.known(|known| {
+            let mut runs = known.serving.iter();
+            let serves = |(session, run): &(&u64, &(Handle, u64))| {
+                run.1 >= known.logged_out && run.0.is_alive() && !known.is_asked(**session, **run)
+            };
+            runs.find(serves).map(|(_, run)| run.0)
+        })
+    }
+
+    /// Whether a daemon lived at some time since then.
+    pub fn lived_since(&self, since: u64) -> bool {
+        let lived = |daemon: &Handle| {
+            daemon.is_alive() || process::dead_since(daemon.pid).is_none_or(|death| death >= since)
+        };
+        self.daemons().iter().any(lived)
+    }
+
+    /// The folder of daemons is removed.
+    pub fn log_out(&self) {
+        let now = now();
+        self.known(|known| known.logged_out = now);
+    }
+
+    /// Daemons that live and that nobody finds any more.
+    pub fn hidden(&self) -> Vec<Handle> {
+        self.known(|known| {
+            let runs = known.serving.values();
+            let hidden = runs.filter(|run| run.1 < known.logged_out && run.0.is_alive());
+            hidden.map(|run| run.0).collect()
+        })
     }
 }
 
 impl Known {
+    fn last_daemon(&self) -> Option<(Handle, Handle)> {
+        let mut all = self.daemons.iter().rev();
+        let living = all.clone().find(|(_, daemon)| daemon.is_alive());
+        living.or(all.next()).copied()
+    }
+
     fn is_asked(&self, session: u64, (daemon, since): (Handle, u64)) -> bool {
         let is_named = self.asked.contains(&session) || self.asked_daemons.contains(&daemon);
         is_named || self.ends > 0 || self.asked_all >= since

@@ -32,8 +32,8 @@ pub enum Act {
     Refused,
     /// Lets the hook of a step give the lease back and end the wait.
     ReleaseInside,
-    /// Lets another thread use the client so many times meanwhile.
-    Beside(u8),
+    /// Lets another thread use the client so many times meanwhile, with steps alone or in all ways.
+    Beside(u8, bool),
     /// Goes on with the other client of this process.
     Swap,
     /// Records so many entries.
@@ -42,8 +42,12 @@ pub enum Act {
     RecordAll,
     /// Takes the lease, and gives it back or not without a command.
     Take(bool),
+    /// Asks for the lease until it has it, so long at most.
+    Insist(u64),
     /// Its process is killed at the door that it passes after so many others.
     DieAtDoor(u64),
+    /// The same right after so many changes that others can see.
+    DieAtChange(u64),
     /// Does nothing.
     Rest(u64),
     /// Lets go of everything.
@@ -70,16 +74,24 @@ pub enum Fate {
     Kill(Whom),
     /// It is killed at the door that it passes after so many others.
     KillAtDoor(Whom, u64),
+    /// It is killed right after so many changes that others can see.
+    KillAtChange(Whom, u64),
     /// Another process ends the daemon.
     End,
+    /// The same, and the daemon is killed after so many changes of its end.
+    EndDoomed(u64),
     /// It is stopped for so many milliseconds.
     Stop(Whom, u64),
     /// Another client begins, with the acts of this one.
     Again(usize),
     /// Another daemon begins, of an owner of its own.
     Launch,
+    /// The same, and it is killed after so many changes.
+    LaunchDoomed(u64),
     /// Somebody sends the daemon a signal.
     Signal,
+    /// The folder of daemons is removed, as those of users are who log out.
+    Logout,
     /// The calendar jumps by so many seconds.
     Jump(i64),
     /// Shared memory has so much left, in kibibytes, for so many milliseconds.
@@ -113,20 +125,22 @@ impl Plan {
         let rng = &mut Rng::with_seed(seed ^ 0x706c_616e);
         let clients = rng.usize(1..5);
         let fates = rng.usize(0..9);
+        let mix = Mix::new(rng, ACTS.iter().map(|act| act.0));
+        let befalls = Mix::new(rng, FATES.iter().map(|fate| fate.0));
         Plan {
             seed,
-            clients: (0..clients).map(|_| acts(rng)).collect(),
+            clients: (0..clients).map(|_| acts(rng, &mix)).collect(),
             fates: (0..fates)
-                .map(|_| (rng.u64(1..400), fate(rng, clients)))
+                .map(|_| (rng.u64(1..400), FATES[befalls.choose(rng)].1(rng, clients)))
                 .collect(),
             failing: *rng.choice(&[0, 0, 0, 50, 500, 5000]).unwrap_or(&0),
             dropping: *rng.choice(&[0, 0, 10_000, 200_000]).unwrap_or(&0),
             preempting: *rng.choice(&[0, 0, 200, 3000]).unwrap_or(&0),
             lateness: *rng.choice(&[100, 1000, 20_000]).unwrap_or(&100),
-            slow: if rng.u32(0..3) == 0 {
-                rng.u64(1..3000)
-            } else {
-                0
+            slow: match rng.u32(0..6) {
+                0 => rng.u64(1..3000),
+                1 => rng.u64(1500..6000),
+                _ => 0,
             },
         }
     }
@@ -179,14 +193,104 @@ impl Plan {
     }
 }
 
-fn acts(rng: &mut Rng) -> Vec<Act> {
+/// What clients do, with its weight.
+const ACTS: [(u32, fn(&mut Rng) -> Act); 24] = [
+    (30, |rng| Act::Steps(rng.u8(1..12))),
+    (6, |rng| Act::SendRecv(rng.u64(0..30))),
+    (6, |rng| Act::Hold(rng.u64(0..100))),
+    (4, |_| Act::Reset),
+    (4, |_| Act::Forward),
+    (4, |_| Act::Interrupt),
+    (8, |_| Act::Release),
+    (6, |rng| Act::Observe(rng.u8(1..6))),
+    (5, |rng| Act::Newer(rng.u64(1..200))),
+    (4, |_| Act::Ask),
+    (5, |rng| Act::Record(rng.u8(1..20))),
+    (9, |rng| Act::Rest(rng.u64(0..300))),
+    (3, |rng| Act::Rest(rng.u64(0..4000))),
+    (4, |_| Act::Detach),
+    (4, |rng| Act::Attach(rng.u64(0..2000))),
+    (1, |_| Act::Shutdown),
+    (2, |_| Act::Count),
+    (3, |_| Act::Refused),
+    (4, |_| Act::ReleaseInside),
+    (9, |rng| Act::Beside(rng.u8(1..=120), rng.bool())),
+    (7, |_| Act::Swap),
+    (6, |rng| Act::Take(rng.bool())),
+    (4, |rng| Act::Insist(rng.u64(0..6000))),
+    (6, |rng| death(rng)),
+];
+
+/// What befalls processes, with its weight.
+const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 13] = [
+    (35, |rng, clients| Fate::Kill(whom(rng, clients))),
+    (20, |rng, clients| {
+        Fate::KillAtDoor(victim(rng, clients), doors(rng))
+    }),
+    (20, |rng, clients| {
+        Fate::KillAtChange(victim(rng, clients), changes(rng))
+    }),
+    (25, |rng, clients| {
+        Fate::Stop(whom(rng, clients), *rng.choice(&STOPS).unwrap_or(&10))
+    }),
+    (15, |rng, clients| Fate::Again(rng.usize(0..clients))),
+    (12, |_, _| Fate::Launch),
+    (4, |rng, _| Fate::LaunchDoomed(changes(rng))),
+    (3, |_, _| Fate::Signal),
+    (5, |rng, _| Fate::Jump(rng.i64(-100_000..100_000))),
+    (10, |rng, _| {
+        Fate::Squeeze(rng.u64(0..2000), rng.u64(1..1000))
+    }),
+    (5, |_, _| Fate::End),
+    (4, |rng, _| Fate::EndDoomed(changes(rng))),
+    (2, |_, _| Fate::Logout),
+];
+
+/// How long processes are stopped [ms].
+const STOPS: [u64; 5] = [10, 300, 1000, 2500, 6000];
+
+/// A choice by weights. Each run has weights of its own: what a run leaves out does not end what it does often.
+struct Mix(Vec<u32>);
+
+impl Mix {
+    fn new(rng: &mut Rng, weights: impl Iterator<Item = u32>) -> Mix {
+        let mut vary = |weight: u32| weight * rng.choice(&[0, 1, 1, 4]).unwrap_or(&1);
+        let mut weights: Vec<u32> = weights.map(&mut vary).collect();
+        if weights.iter().all(|weight| *weight == 0) {
+            weights.fill(1);
+        }
+        Mix(weights)
+    }
+
+    fn choose(&self, rng: &mut Rng) -> usize {
+        let mut left = rng.u32(0..self.0.iter().sum());
+        let fits = |weight: &u32| match left.checked_sub(*weight) {
+            Some(rest) => {
+                left = rest;
+                false
+            }
+            None => true,
+        };
+        self.0.iter().position(fits).unwrap_or(0)
+    }
+}
+
+fn acts(rng: &mut Rng, mix: &Mix) -> Vec<Act> {
     let mut acts = vec![Act::Rest(rng.u64(0..300))];
     if rng.u32(0..3) == 0 {
-        acts.push(Act::DieAtDoor(doors(rng)));
+        acts.push(death(rng));
     }
     acts.push(Act::Attach(rng.u64(0..2000)));
-    acts.extend((0..rng.usize(1..12)).map(|_| act(rng)));
+    let count = rng.usize(1..12);
+    acts.extend((0..count).map(|_| ACTS[mix.choose(rng)].1(rng)));
     acts
+}
+
+fn death(rng: &mut Rng) -> Act {
+    match rng.bool() {
+        true => Act::DieAtDoor(doors(rng)),
+        false => Act::DieAtChange(changes(rng)),
+    }
 }
 
 /// Doors from one file to the next, of one call, or of a longer life.
@@ -195,52 +299,24 @@ fn doors(rng: &mut Rng) -> u64 {
     rng.u64(1..=most)
 }
 
-fn act(rng: &mut Rng) -> Act {
-    match rng.u32(0..135) {
-        0..30 => Act::Steps(rng.u8(1..12)),
-        30..36 => Act::SendRecv(rng.u64(0..30)),
-        36..42 => Act::Hold(rng.u64(0..100)),
-        42..46 => Act::Reset,
-        46..50 => Act::Forward,
-        50..54 => Act::Interrupt,
-        54..62 => Act::Release,
-        62..68 => Act::Observe(rng.u8(1..6)),
-        68..73 => Act::Newer(rng.u64(1..200)),
-        73..77 => Act::Ask,
-        77..82 => Act::Record(rng.u8(1..20)),
-        82..91 => Act::Rest(rng.u64(0..300)),
-        91..95 => Act::Detach,
-        95..99 => Act::Attach(rng.u64(0..2000)),
-        99..100 => Act::Shutdown,
-        100..102 => Act::Count,
-        102..105 => Act::Refused,
-        105..109 => Act::ReleaseInside,
-        109..118 => Act::Beside(rng.u8(1..=120)),
-        118..125 => Act::Swap,
-        125..131 => Act::Take(rng.bool()),
-        _ => Act::DieAtDoor(doors(rng)),
-    }
+/// Changes of one call, of an attach, or of a longer life.
+fn changes(rng: &mut Rng) -> u64 {
+    let most = *rng.choice(&[10, 60, 300]).unwrap_or(&10);
+    rng.u64(1..=most)
 }
 
-fn fate(rng: &mut Rng, clients: usize) -> Fate {
-    let whom = match rng.u32(0..10) {
+fn whom(rng: &mut Rng, clients: usize) -> Whom {
+    match rng.u32(0..10) {
         0..6 => Whom::Client(rng.usize(0..clients)),
         6..9 => Whom::Daemon,
         _ => Whom::Owner,
-    };
-    match rng.u32(0..130) {
-        100..125 if whom != Whom::Owner => Fate::KillAtDoor(whom, doors(rng)),
-        100..125 => Fate::Kill(whom),
-        125..130 => Fate::End,
-        0..35 => Fate::Kill(whom),
-        35..60 => Fate::Stop(
-            whom,
-            *rng.choice(&[10, 300, 1000, 2500, 6000]).unwrap_or(&10),
-        ),
-        60..75 => Fate::Again(rng.usize(0..clients)),
-        75..87 => Fate::Launch,
-        87..90 => Fate::Signal,
-        90..95 => Fate::Jump(rng.i64(-100_000..100_000)),
-        _ => Fate::Squeeze(rng.u64(0..2000), rng.u64(1..1000)),
+    }
+}
+
+/// An owner does nothing at whose doors it could die.
+fn victim(rng: &mut Rng, clients: usize) -> Whom {
+    match rng.u32(0..3) {
+        0 => Whom::Daemon,
+        _ => Whom::Client(rng.usize(0..clients)),
     }
 }

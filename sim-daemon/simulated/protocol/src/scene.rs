@@ -9,7 +9,8 @@ use sim_machine::system::signals;
 use sim_machine::thread::sleep;
 use sim_machine::time::{jump, now};
 use sim_machine::{Outcome, Run, note};
-use sim_protocol_simulated::{ProtocolError, sweep};
+use sim_protocol_simulated::paths::DaemonPaths;
+use sim_protocol_simulated::{ProtocolError, cleanup_after_death, sweep};
 
 use crate::client::Actor;
 use crate::daemon::{self, root};
@@ -68,7 +69,7 @@ fn play(plan: &Plan, facts: &Facts) {
         clients,
         orphans,
     };
-    cast.launch();
+    cast.launch(u64::MAX);
     for number in 0..plan.clients.len() {
         let client = cast.begin(number);
         cast.clients.push(client);
@@ -82,13 +83,39 @@ fn play(plan: &Plan, facts: &Facts) {
     cast.end();
 }
 
+/// Removes what a daemon left that has ended, as its launcher does.
+fn clean_up(facts: &Facts) {
+    let (began, root) = (now(), root());
+    let cleaned = cleanup_after_death(Some(&root), daemon::NAME);
+    note(|| format!("cleaned up: {cleaned:?}"));
+    let is_excused = facts.may_fail(began) || facts.lived_since(began);
+    match cleaned {
+        _ if is_excused => {}
+        Ok(true) => {
+            let paths = DaemonPaths::new(Some(&root), daemon::NAME).expect("a good name");
+            let folder = Path::new("/dev/shm").join(paths.stem());
+            let is_left = fs::exists(&folder);
+            assert!(
+                !is_left || facts.lived_since(began),
+                "left behind: {folder:?}"
+            );
+        }
+        // who is stopped may hold the lock
+        Ok(false) => assert!(facts.stopped_since(began) > 0, "nobody cleans up"),
+        Err(error) => panic!("cleaning up: {error}"),
+    }
+}
+
 impl Cast<'_> {
-    /// Launches a daemon, from an owner of its own.
-    fn launch(&self) {
+    /// Launches a daemon, from an owner of its own, that is killed after so many changes.
+    fn launch(&self, changes: u64) {
         let (facts, failing) = (self.facts.clone(), self.plan.failing > 0);
         let owner = process::start(move || {
             let (owner, own) = (Handle::this(), facts.clone());
             let daemon = process::start(move || {
+                if !own.is_calm() {
+                    Handle::this().kill_at_change(changes);
+                }
                 let began = now();
                 let served = daemon::run(&own, owner.pid);
                 let may_fail = failing || own.was_squeezed(began);
@@ -102,6 +129,7 @@ impl Cast<'_> {
             while daemon.is_alive() {
                 sleep(Duration::from_millis(100));
             }
+            clean_up(&facts);
         });
         note(|| format!("owner {}", owner.pid));
     }
@@ -137,9 +165,17 @@ impl Cast<'_> {
                 let who = self.who(whom);
                 who.into_iter().for_each(|who| who.kill_at_door(doors));
             }
-            Fate::End => {
-                let facts = self.facts.clone();
-                process::start(move || Actor::new(&facts).end());
+            Fate::KillAtChange(whom, changes) => {
+                let who = self.who(whom);
+                who.into_iter().for_each(|who| who.kill_at_change(changes));
+            }
+            Fate::End => self.end_daemon(),
+            Fate::EndDoomed(changes) => {
+                let daemon = self.facts.daemon();
+                daemon
+                    .iter()
+                    .for_each(|daemon| daemon.kill_at_change(changes));
+                self.end_daemon();
             }
             Fate::Stop(whom, time) => {
                 let Some(who) = self.who(whom) else { return };
@@ -154,7 +190,12 @@ impl Cast<'_> {
                     self.clients[number] = self.begin(number);
                 }
             }
-            Fate::Launch => self.launch(),
+            Fate::Launch => self.launch(u64::MAX),
+            Fate::LaunchDoomed(changes) => self.launch(changes),
+            Fate::Logout => {
+                self.facts.log_out();
+                let _ = fs::remove_dir_all(root());
+            }
             Fate::Signal => {
                 let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
                 if let Some(daemon) = daemon {
@@ -170,6 +211,12 @@ impl Cast<'_> {
                 sim_machine::at(Duration::from_millis(time), || fs::set_capacity(SHARED));
             }
         }
+    }
+
+    /// As a process does that is no client.
+    fn end_daemon(&self) {
+        let facts = self.facts.clone();
+        process::start(move || Actor::new(&facts).end());
     }
 
     /// A daemon whose owner is dead goes, unless it is stopped.
@@ -199,10 +246,8 @@ impl Cast<'_> {
             };
             assert!(waited < most, "a client never ends");
         }
-        sim_machine::calm();
         self.facts.calm();
-        let all = self.clients.iter().copied().chain(self.facts.daemons());
-        all.for_each(|process| process.kill_at_door(u64::MAX));
+        sim_machine::calm();
         // nobody is stopped any more, shared memory has room, and the daemon has seen who is dead
         let calm = self.facts.calm_at().saturating_sub(now());
         sleep(Duration::from_nanos(calm) + self.facts.slow() + Duration::from_secs(1));
@@ -212,6 +257,7 @@ impl Cast<'_> {
             "frames were overwritten that somebody holds"
         );
         self.last_client();
+        self.end_hidden();
         let facts = self.facts.clone();
         self.in_a_process(move || {
             Actor::new(&facts).end();
@@ -236,7 +282,7 @@ impl Cast<'_> {
     /// A daemon that lives serves the next client, and keeps nothing of those who went.
     fn last_client(&self) {
         let lives = || {
-            let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
+            let daemon = self.facts.server();
             daemon.filter(|_| self.plan.failing == 0)
         };
         let (before, commands) = (lives(), self.facts.commands());
@@ -257,6 +303,16 @@ impl Cast<'_> {
             );
             let (first, last) = (self.facts.first_files(), kinds_of_files());
             assert_eq!(last, first, "the daemon keeps what others left");
+        }
+    }
+
+    /// Ends the daemons that are found by no name any more.
+    fn end_hidden(&self) {
+        for daemon in self.facts.hidden() {
+            self.facts.ask_daemon(daemon);
+            signals::send(daemon.pid);
+            sleep(Duration::from_nanos(ORPHAN_MAX));
+            assert!(!daemon.is_alive(), "{daemon:?} hears no signal");
         }
     }
 

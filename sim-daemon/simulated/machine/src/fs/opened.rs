@@ -99,6 +99,7 @@ impl Files {
             Some(held) => held == Lock::Shared && lock == Lock::Shared,
         });
         if is_free {
+            self.changes += 1;
             self.of_mut(number)?.lock = Some(lock);
         }
         Ok(is_free)
@@ -144,6 +145,7 @@ impl Files {
     /// Makes a file as long as that, if it is shorter.
     pub(super) fn lengthen(&mut self, inode: u64, length: u64) -> io::Result<()> {
         let clock = self.clock;
+        self.changes += 1;
         let content = self.content_mut(inode)?;
         content.length = content.length.max(length);
         self.inode_mut(inode).modified = clock;

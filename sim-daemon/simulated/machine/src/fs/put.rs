@@ -71,6 +71,7 @@ impl Files {
     /// Changes who may do what.
     pub(crate) fn set_mode(&mut self, path: &Path, mode: u32) -> io::Result<()> {
         let number = self.find(path)?;
+        self.changes += 1;
         self.inode_mut(number).mode = mode;
         Ok(())
     }

@@ -28,6 +28,8 @@ pub(crate) struct Files {
     order: u64,
     /// The clock of the calendar [ns].
     pub(crate) clock: i64,
+    /// Changes that other processes can see, those of the transport's lists included.
+    pub(crate) changes: u64,
 }
 
 /// A file or a folder.
@@ -76,6 +78,7 @@ impl Files {
             used: 0,
             order,
             clock: 0,
+            changes: 0,
         };
         for path in ["/tmp", "/run", SHARED_MEMORY] {
             let made = files.put_folder(Path::new(path)).expect("it is new");
@@ -121,6 +124,7 @@ impl Files {
     /// The entries of a folder that are about to change.
     fn changed(&mut self, folder: u64) -> io::Result<&mut BTreeMap<OsString, u64>> {
         let clock = self.clock;
+        self.changes += 1;
         let inode = self.inode_mut(folder);
         match &mut inode.kind {
             Kind::File(_) => err(ENOTDIR),

@@ -125,6 +125,7 @@ fn is_joined(plan: &Plan, (sender, receiver): (u128, u128), end: End, other: &En
     };
     step("joins a connection");
     let joined = with(|world| {
+        world.files.changes += 1;
         let joined = world.wires.connections.get_mut(&connection);
         joined.is_some_and(|joined| joined.join(end))
     });
@@ -251,7 +252,10 @@ pub(crate) fn unlink(port: u128, link: u64) {
 /// Leaves a connection; who leaves last removes its file.
 pub(crate) fn leave(connection: u64, end: End) {
     step("leaves a connection");
-    let path = with(|world| mark(world, connection, end));
+    let path = with(|world| {
+        world.files.changes += 1;
+        mark(world, connection, end)
+    });
     if let Some(path) = path {
         remove("removes a connection", path);
     }

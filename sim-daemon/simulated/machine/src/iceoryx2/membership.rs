@@ -134,6 +134,7 @@ impl Port {
     pub(crate) fn register(&self, entry: Entry) -> bool {
         step("registers a port");
         with(|world| {
+            world.files.changes += 1;
             let service = world.wires.services.get_mut(&self.service_id);
             service.is_some_and(|service| service.add(self.role, entry))
         })
@@ -146,6 +147,7 @@ impl Port {
         }
         step("takes a port off its service");
         with(|world| {
+            world.files.changes += 1;
             if let Some(service) = world.wires.services.get_mut(&self.service_id) {
                 service.remove(self.role, self.id);
             }
