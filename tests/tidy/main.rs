@@ -1,6 +1,7 @@
 //! The house rules of ARCHITECTURE.md and STYLE.md that a machine can check.
 
 mod doors;
+mod hidden;
 mod law;
 mod length;
 mod order;
