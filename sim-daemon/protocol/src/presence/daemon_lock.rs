@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::doors::exists;
 use crate::doors::fs::{self, File};
-use crate::doors::sync::{Arc, Mutex, PoisonError};
+use crate::doors::sync::{Arc, Mutex, PoisonError, Weak};
 use crate::doors::system::files::{self, private, shared_memory};
 use crate::doors::time::Instant;
 use crate::presence::paths::{
@@ -30,7 +30,7 @@ const TRANSPORT_FOLDERS: [&str; 2] = ["nodes", "services"];
 #[derive(Debug)]
 pub struct DaemonLock {
     paths: DaemonPaths,
-    file: File,
+    file: Arc<File>,
     /// The lock that a sweeper finds when our root folder is gone.
     mark: Option<File>,
     /// Whether its files are ours still: who removes them holds this.
@@ -41,6 +41,7 @@ pub struct DaemonLock {
 #[derive(Debug, Clone)]
 pub struct Remains {
     paths: DaemonPaths,
+    file: Weak<File>,
     is_held: Arc<Mutex<bool>>,
 }
 
@@ -110,7 +111,7 @@ impl DaemonLock {
         file.set_len(0).map_err(root_error)?;
         Ok(Some(DaemonLock {
             paths: paths.clone(),
-            file,
+            file: Arc::new(file),
             mark: None,
             is_held: Arc::new(Mutex::new(true)),
         }))
@@ -152,6 +153,7 @@ impl DaemonLock {
     pub fn remains(&self) -> Remains {
         Remains {
             paths: self.paths.clone(),
+            file: Arc::downgrade(&self.file),
             is_held: Arc::clone(&self.is_held),
         }
     }
@@ -163,7 +165,7 @@ impl Drop for DaemonLock {
         if std::mem::take(&mut *is_held) {
             self.withdraw();
             remove_shared_files(&self.paths, self.mark.take());
-            remove_named_files(&self.paths);
+            remove_named_files(&self.paths, &self.file);
         }
     }
 }
@@ -181,8 +183,11 @@ impl Remains {
         if !std::mem::take(&mut *is_held) {
             return;
         }
+        let Some(file) = self.file.upgrade() else {
+            return;
+        };
         // as `DaemonLock::withdraw`
-        let _ = private().truncate(true).open(self.paths.lock_path());
+        let _ = file.set_len(0);
         // other threads of ours may be making files
         for _ in 0..REMOVALS {
             remove_shared_files(&self.paths, None);
@@ -190,15 +195,18 @@ impl Remains {
                 break;
             }
         }
-        remove_named_files(&self.paths);
+        remove_named_files(&self.paths, &file);
     }
 }
 
-/// Removes the files under the daemon's root.
-fn remove_named_files(paths: &DaemonPaths) {
-    let _ = fs::remove_file(paths.stop_path());
-    // the file goes before the lock does, so nobody can lock a file that is about to go
-    let _ = fs::remove_file(paths.lock_path());
+/// Removes the files under the daemon's root, unless another daemon has them after a logout.
+fn remove_named_files(paths: &DaemonPaths, lock: &File) {
+    let path = paths.lock_path();
+    if files::is_at(lock, &path).unwrap_or(true) {
+        let _ = fs::remove_file(paths.stop_path());
+        // the file goes before the lock does, so nobody can lock a file that is about to go
+        let _ = fs::remove_file(path);
+    }
     remove_own_root(paths.root());
 }
 

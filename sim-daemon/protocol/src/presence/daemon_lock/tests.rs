@@ -192,3 +192,26 @@ fn what_is_left_of_a_root_folder_that_is_gone_is_swept_and_the_living_are_spared
     assert!(!paths.shared_folder().exists());
     fs::remove_dir(root("other")).unwrap();
 }
+
+#[test]
+fn a_daemon_that_ends_after_a_logout_leaves_the_next_one_its_lock_file() {
+    let root = root("next");
+    let paths = DaemonPaths::new(Some(&root), "next").unwrap();
+    for ends_at_once in [false, true] {
+        let held = DaemonLock::take(&paths).unwrap();
+        let remains = held.remains();
+        // a logout removes the folder, and the next daemon makes it again
+        fs::remove_dir_all(&root).unwrap();
+        fs::create_dir(&root).unwrap();
+        fs::write(paths.lock_path(), "of another").unwrap();
+        if ends_at_once {
+            remains.remove();
+        }
+        drop(held);
+        let left = fs::read(paths.lock_path()).unwrap();
+        assert_eq!(left, b"of another", "at once: {ends_at_once}");
+        fs::remove_dir_all(&root).unwrap();
+        fs::create_dir(&root).unwrap();
+    }
+    fs::remove_dir(&root).unwrap();
+}
