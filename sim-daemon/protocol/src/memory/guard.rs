@@ -5,6 +5,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What the transport returns; `None` when it panicked.
+#[inline]
 pub(crate) fn guarded<T>(call: impl FnOnce() -> T) -> Option<T> {
     // ports that panicked are dropped, or looked at again from the start
     catch_unwind(AssertUnwindSafe(call)).ok()

@@ -16,6 +16,7 @@ use crate::memory::mapping;
 type Loan<S, H> = SampleMutUninit<S, [MaybeUninit<Line>], H>;
 
 /// The head of a received sample; `None` where its offset, which lies in shared memory too, leads out of it.
+#[inline] // here as below: each frame calls it, and the units of code would decide
 pub(crate) fn head<S: Service, H: Debug + Copy + ZeroCopySend>(
     sample: &Sample<S, [Line], H>,
 ) -> Option<H> {
@@ -26,6 +27,7 @@ pub(crate) fn head<S: Service, H: Debug + Copy + ZeroCopySend>(
 }
 
 /// The head and the words of a received sample; `None` where offset or length lead out of shared memory.
+#[inline]
 pub(crate) fn received<S: Service, H: Debug + Copy + ZeroCopySend>(
     sample: &Sample<S, [Line], H>,
 ) -> Option<(H, &[u64])> {
@@ -36,6 +38,7 @@ pub(crate) fn received<S: Service, H: Debug + Copy + ZeroCopySend>(
 }
 
 /// A slot to write to, of so many lines; `None` where shared memory makes no sense.
+#[inline]
 pub(crate) fn loan<S: Service, H: Debug + Default + ZeroCopySend>(
     publisher: &Publisher<S, [Line], H>,
     lines: usize,
