@@ -11,6 +11,7 @@ use crate::memory::guard::guarded;
 use crate::memory::loaned;
 use crate::memory::port::Port;
 use crate::presence::connection::{Connection, S, damaged, intact, intact_there, malformed};
+use crate::presence::liveness::Reach;
 use crate::transport::{self, FrameSubscriber, Sleeper};
 use crate::waiting::SLICE;
 use crate::waiting::hook::Hook;
@@ -25,6 +26,7 @@ pub(crate) struct Observer {
     table: Option<Arc<Table>>,
     frames: Arc<Alive>,
     subscriber: Arc<FrameSubscriber<S>>,
+    reach: Reach,
     listener: Sleeper<S>,
 }
 
@@ -46,6 +48,7 @@ impl Observer {
             description: Arc::clone(description),
             table: None,
             frames: Alive::new(),
+            reach: connection.peer.reach(subscriber.id().value()),
             subscriber: Arc::new(subscriber),
             listener,
         })
@@ -56,8 +59,8 @@ impl Observer {
         let Some(sample) = self.receive()? else {
             self.connection.peer.check()?;
             intact_there(&self.connection.peer)?;
-            let port = self.subscriber.id().value();
-            self.connection.peer.check_reach(&[port])?;
+            let reach = std::slice::from_ref(&self.reach);
+            self.connection.peer.check_reach(reach)?;
             return Ok(None);
         };
         let peer = &self.connection.peer;

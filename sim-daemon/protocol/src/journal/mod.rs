@@ -173,7 +173,8 @@ impl Journal {
                     return Err(ProtocolError::Interrupted);
                 }
                 let port = self.subscriber.id().value();
-                self.connection.peer.check_reach(&[port])?;
+                let peer = &self.connection.peer;
+                peer.check_reach(&[peer.reach(port)])?;
             }
             if start.elapsed() >= timeout {
                 return Ok(None);

@@ -16,7 +16,7 @@ use crate::memory::guard::guarded;
 use crate::memory::loaned;
 use crate::memory::port::Port;
 use crate::presence::connection::{Connection, S, damaged, intact, intact_lease, malformed, pause};
-use crate::presence::liveness::Peer;
+use crate::presence::liveness::{Peer, Reach};
 use crate::transport::{self, CommandPublisher, FrameService, FrameSubscriber, Sleeper};
 use crate::waiting::affinity::CoreAffinity;
 use crate::waiting::hook::Hook;
@@ -75,6 +75,8 @@ pub(crate) struct Controller {
     subscriber: Arc<FrameSubscriber<S>>,
     listener: Sleeper<S>,
     service: FrameService<S>,
+    /// Of both ports.
+    reach: [Reach; 2],
     /// Last, so that it ends last: the daemon must not think us gone before the ports are.
     _heartbeat: HeartbeatThread,
 }
@@ -143,7 +145,9 @@ impl Controller {
         let (service, subscriber, listener, publisher) = ports;
         // the daemon's step needs its threads, and we spin on one more
         let free_core = cores() > description.busy_threads();
+        let reach = [subscriber.id().value(), publisher.id().value()];
         Controller {
+            reach: reach.map(|port| connection.peer.reach(port)),
             connection: Arc::clone(connection),
             description: Arc::clone(description),
             epoch,
@@ -275,7 +279,7 @@ impl Controller {
             epoch: self.epoch,
             subscriber: &self.subscriber,
             service: &self.service,
-            ports: [self.subscriber.id().value(), self.publisher.id().value()],
+            reach: &self.reach,
             peer: &self.connection.peer,
             hook,
             since: Instant::now(),
@@ -394,7 +398,7 @@ struct Answer<'a> {
     epoch: u64,
     subscriber: &'a FrameSubscriber<S>,
     service: &'a FrameService<S>,
-    ports: [u128; 2],
+    reach: &'a [Reach],
     peer: &'a Peer,
     hook: Hook<'a>,
     since: Instant,
@@ -424,7 +428,7 @@ impl Awaited<FrameSample> for Answer<'_> {
         }
         self.peer.check()?;
         intact_lease(self.peer, self.epoch)?;
-        self.peer.check_reach(&self.ports)?;
+        self.peer.check_reach(self.reach)?;
         if self.service.dynamic_config().number_of_publishers() == 0 {
             return Err(self.peer.lease_lost());
         }

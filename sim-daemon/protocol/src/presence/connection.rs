@@ -177,7 +177,7 @@ impl Connection {
             if polled.elapsed() > SLICE {
                 self.peer.check()?;
                 intact_there(&self.peer)?;
-                self.peer.check_reach(&[port])?;
+                self.peer.check_reach(&[self.peer.reach(port)])?;
                 if hook().is_break() {
                     return Err(ProtocolError::Interrupted);
                 }
@@ -309,7 +309,7 @@ pub(crate) fn intact(peer: &Peer) -> Result<(), ProtocolError> {
 
 /// As [`intact`], and asks the daemon's files, which takes a few microseconds.
 pub(crate) fn intact_there(peer: &Peer) -> Result<(), ProtocolError> {
-    match described::is_damaged(&peer.paths, peer.beacon.session, Damage::Daemon) {
+    match peer.is_damaged() {
         true => Err(damaged(peer, "wait for the daemon")),
         false => intact(peer),
     }

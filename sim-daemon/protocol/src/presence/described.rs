@@ -2,7 +2,7 @@
 //! that its shared memory is damaged, and which ports of clients it cannot reach.
 
 use std::io::{Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::doors::exists;
 use crate::doors::fs;
@@ -64,7 +64,8 @@ pub(crate) enum Damage {
     Lease(u64),
 }
 
-fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
+/// The file whose presence says so. Its name takes longer to make than to look for.
+pub(crate) fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
     let name = match damage {
         Damage::Daemon => format!("{session:016x}.damaged"),
         Damage::Lease(epoch) => format!("{session:016x}.{epoch}.damaged"),
@@ -86,7 +87,8 @@ pub(crate) fn is_damaged(paths: &DaemonPaths, session: u64, damage: Damage) -> b
     exists(&mark(paths, session, damage))
 }
 
-fn unreached(paths: &DaemonPaths, session: u64, port: u128) -> PathBuf {
+/// The file in which the daemon says why it cannot reach a port.
+pub(crate) fn unreached(paths: &DaemonPaths, session: u64, port: u128) -> PathBuf {
     // as the transport names what belongs to a port, so that it goes when the port is gone
     let name = format!("{session:016x}_{port}.unreached");
     paths.shared_folder().join(name)
@@ -108,14 +110,13 @@ pub(crate) fn mark_unreached(
     }
 }
 
-/// Why the daemon cannot reach a port, where it cannot. A few microseconds.
-pub(crate) fn why_unreached(paths: &DaemonPaths, session: u64, port: u128) -> Option<String> {
-    let path = unreached(paths, session, port);
-    if !exists(&path) {
+/// Why the daemon cannot reach the port of an [`unreached`] file, where it cannot. A microsecond.
+pub(crate) fn why_unreached(path: &Path) -> Option<String> {
+    if !exists(path) {
         return None;
     }
     let mut reason = String::new();
-    if let Ok(file) = private().open(&path) {
+    if let Ok(file) = private().open(path) {
         let _ = file.take(REASON_MAX).read_to_string(&mut reason);
     }
     // there was no room for it

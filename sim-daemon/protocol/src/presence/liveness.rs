@@ -1,11 +1,13 @@
 //! Is the daemon that we attached to still there?
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::ProtocolError;
+use crate::doors::exists;
 use crate::doors::fs::File;
 use crate::doors::sync::Arc;
-use crate::presence::described;
+use crate::presence::described::{self, Damage};
 use crate::presence::paths::{Beacon, DaemonPaths, Presence};
 
 /// The daemon that a client attached to.
@@ -15,7 +17,13 @@ pub(crate) struct Peer {
     pub(crate) beacon: Beacon,
     /// Its lock file. A logout may remove the file's name while the daemon lives on, and holds the lock.
     lock: Arc<File>,
+    /// The file that says that its shared memory is damaged.
+    damage: PathBuf,
 }
+
+/// Where the daemon says that it cannot reach a port of ours.
+#[derive(Debug)]
+pub(crate) struct Reach(PathBuf);
 
 impl Peer {
     /// Opens the lock file of a daemon that was seen to run.
@@ -27,7 +35,9 @@ impl Peer {
             return Err(lost(&paths, beacon));
         };
         let lock = Arc::new(lock);
+        let damage = described::mark(&paths, beacon.session, Damage::Daemon);
         Ok(Peer {
+            damage,
             paths,
             beacon,
             lock,
@@ -57,9 +67,19 @@ impl Peer {
         self.paths.presence_in(&self.lock)
     }
 
+    /// Whether the daemon has found its own shared memory damaged. A microsecond.
+    pub(crate) fn is_damaged(&self) -> bool {
+        exists(&self.damage)
+    }
+
+    /// What [`Peer::check_reach`] looks at for a port.
+    pub(crate) fn reach(&self, port: u128) -> Reach {
+        Reach(described::unreached(&self.paths, self.beacon.session, port))
+    }
+
     /// Errors when the daemon has found that it cannot reach one of our ports.
-    pub(crate) fn check_reach(&self, ports: &[u128]) -> Result<(), ProtocolError> {
-        let why = |&port| described::why_unreached(&self.paths, self.beacon.session, port);
+    pub(crate) fn check_reach(&self, ports: &[Reach]) -> Result<(), ProtocolError> {
+        let why = |Reach(path): &Reach| described::why_unreached(path);
         match ports.iter().find_map(why) {
             None => Ok(()),
             Some(problem) => Err(ProtocolError::Unreached {
