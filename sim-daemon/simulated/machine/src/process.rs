@@ -1,5 +1,7 @@
 //! Processes: threads that live and die together.
 
+use std::time::Duration;
+
 use crate::world::{self, World, is_on, me, with};
 
 /// A process, dead ones included until another gets their number.
@@ -15,6 +17,10 @@ pub(crate) struct Process {
     pub(crate) doors: u64,
     /// Changes that it makes yet.
     pub(crate) changes: u64,
+    /// It is stopped behind them for so long, and not killed [ns].
+    pub(crate) halt: Option<u64>,
+    /// When it goes on, if it is stopped for a time [ns].
+    pub(crate) until: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,12 +34,29 @@ pub(crate) enum State {
 const FIRST: u32 = 100;
 
 impl World {
-    /// Whether a thread may go on at all.
-    pub(crate) fn runs(&self, task: usize) -> bool {
+    /// When a thread may go on; never if its process does not [ns].
+    pub(crate) fn wake(&self, task: usize) -> Option<u64> {
+        let (process, wake) =
+            (self.tasks.get(task)).map_or((0, 0), |task| (task.process, task.wake));
+        match self.processes.get(&process) {
+            Some(process) if process.state == State::Running => Some(wake),
+            Some(process) if process.state == State::Stopped && process.until < u64::MAX => {
+                Some(wake.max(process.until))
+            }
+            Some(_) => None,
+            None => Some(wake),
+        }
+    }
+
+    /// A thread goes on, and its process with it.
+    pub(crate) fn goes_on(&mut self, task: usize) {
         let process = self.tasks.get(task).map_or(0, |task| task.process);
-        self.processes
-            .get(&process)
-            .is_none_or(|process| process.state == State::Running)
+        if let Some(process) = self.processes.get_mut(&process)
+            && process.state == State::Stopped
+        {
+            (process.state, process.since) = (State::Running, self.now);
+            process.until = u64::MAX;
+        }
     }
 
     pub(crate) fn is_alive(&self, pid: u32) -> bool {
@@ -67,7 +90,16 @@ impl World {
         if let Some(process) = self.processes.get_mut(&pid) {
             process.changes = process.changes.saturating_sub(changes);
             if process.changes == 0 {
-                process.doors = process.doors.min(1);
+                process.changes = u64::MAX;
+                match process.halt.take() {
+                    None => process.doors = process.doors.min(1),
+                    Some(time) if process.state == State::Running => {
+                        (process.state, process.since) = (State::Stopped, self.now);
+                        process.until = self.now + time;
+                        self.halts.push((self.now, self.now + time, pid));
+                    }
+                    Some(_) => {}
+                }
             }
         }
     }
@@ -143,13 +175,21 @@ impl Handle {
         self.doom(u64::MAX, changes);
     }
 
+    /// Stops it right after so many of them, for a time.
+    pub fn stop_at_change(self, changes: u64, time: Duration) {
+        self.doom(u64::MAX, changes);
+        self.change(|process| process.halt = Some(time.as_nanos() as u64));
+    }
+
     fn doom(self, doors: u64, changes: u64) {
+        self.change(|process| {
+            (process.doors, process.changes, process.halt) = (doors, changes, None);
+        });
+    }
+
+    fn change(self, call: impl FnOnce(&mut Process)) {
         if self.is_alive() {
-            with(|world| {
-                if let Some(process) = world.processes.get_mut(&self.pid) {
-                    (process.doors, process.changes) = (doors, changes);
-                }
-            });
+            with(|world| world.processes.get_mut(&self.pid).map(call));
         }
     }
 
@@ -189,6 +229,8 @@ pub fn start(main: impl FnOnce() + Send + 'static) -> Handle {
                 since,
                 doors,
                 changes,
+                halt: None,
+                until: u64::MAX,
             },
         );
         world.line(|| format!("starts process {pid}"));
@@ -252,6 +294,7 @@ fn change(pid: u32, from: State, to: State) {
             && process.state == from
         {
             (process.state, process.since) = (to, world.now);
+            process.until = u64::MAX;
             world.line(|| format!("process {pid} is {to:?}"));
         }
     });
@@ -260,6 +303,11 @@ fn change(pid: u32, from: State, to: State) {
 /// Whether a process lives, stopped ones included.
 pub fn is_alive(pid: u32) -> bool {
     with(|world| world.is_alive(pid))
+}
+
+/// When processes were stopped at a change: begin, end and number.
+pub fn halts() -> Vec<(u64, u64, u32)> {
+    with(|world| world.halts.clone())
 }
 
 /// Since when the process of this number has been dead [ns].

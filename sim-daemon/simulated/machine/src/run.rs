@@ -24,8 +24,10 @@ pub struct Run {
     pub failing: u32,
     /// Notifications in a million that are lost.
     pub dropping: u32,
-    /// Doors in a million behind which a thread loses its core for up to 16 ms.
+    /// Doors in a million behind which a thread loses its core.
     pub preempting: u32,
+    /// How long at most, as a power of two [µs].
+    pub longest: u32,
     /// Sleepers wake this much later, at most, once in sixteen times [ns].
     pub lateness: u64,
     /// Doors after which a run has failed: something never ends.
@@ -74,7 +76,7 @@ impl Run {
         let mut world = World::new(self.seed);
         (world.failing, world.lateness) = (self.failing, self.lateness);
         (world.dropping, world.steps_max) = (self.dropping, self.steps_max);
-        world.preempting = self.preempting;
+        (world.preempting, world.longest) = (self.preempting, self.longest);
         world.trace = self.trace.then(Default::default);
         let begin = world.now;
         exchange(Some(world));
@@ -115,8 +117,17 @@ pub fn calm() {
         (world.failing, world.dropping, world.preempting) = (0, 0, 0);
         for process in world.processes.values_mut() {
             (process.doors, process.changes) = (u64::MAX, u64::MAX);
+            process.halt = None;
         }
     });
+}
+
+/// Time between these two in which threads had lost their cores, of all threads together [ns].
+pub fn lost(begin: u64, end: u64) -> u64 {
+    with(|world| {
+        let lost = |&(from, to): &(u64, u64)| to.min(end).saturating_sub(from.max(begin));
+        world.losses.iter().map(lost).sum()
+    })
 }
 
 /// Does something after a time, in the process of the caller.

@@ -32,23 +32,13 @@ impl Scheduler for ByTime {
             if world.steps > world.steps_max {
                 return None;
             }
-            let runs = |world: &World, task: &Task| world.runs(usize::from(task.id()));
-            let wake = |task: &&&Task| {
-                world
-                    .tasks
-                    .get(usize::from(task.id()))
-                    .map_or(0, |task| task.wake)
-            };
-            let first = runnable
-                .iter()
-                .filter(|task| runs(world, task))
-                .map(|task| wake(&task))
-                .min()?;
+            let wake = |world: &World, task: &Task| world.wake(usize::from(task.id()));
+            let first = runnable.iter().filter_map(|task| wake(world, task)).min()?;
             if first == u64::MAX {
                 return None;
             }
             world.now = world.now.max(first);
-            let ready = |task: &&&Task| runs(world, task) && wake(task) <= world.now;
+            let ready = |task: &&&Task| wake(world, task).is_some_and(|wake| wake <= world.now);
             let count = runnable.iter().filter(ready).count();
             let chosen = runnable
                 .iter()
@@ -56,6 +46,7 @@ impl Scheduler for ByTime {
                 .nth(world.rng.clone().usize(0..count))?;
             let chosen = chosen.id();
             world.rng.u64(..);
+            world.goes_on(usize::from(chosen));
             Some(chosen)
         })
     }

@@ -14,6 +14,8 @@ use crate::system::System;
 
 /// Lines of the trace that are kept.
 const LINES: usize = 4000;
+/// Shorter losses of a core are not noted [ns].
+const LOSS_MIN: u64 = 1_000_000;
 /// Longest time that passes at a door [ns].
 const DOOR_MAX: u64 = 2_000;
 
@@ -41,6 +43,12 @@ pub(crate) struct World {
     pub(crate) dropping: u32,
     /// Doors in a million behind which a thread loses its core for a while.
     pub(crate) preempting: u32,
+    /// How long at most, as a power of two [µs].
+    pub(crate) longest: u32,
+    /// When threads had lost their core for longer than a millisecond: begin and end [ns].
+    pub(crate) losses: Vec<(u64, u64)>,
+    /// When processes were stopped at a change: begin and end [ns], and their number.
+    pub(crate) halts: Vec<(u64, u64, u32)>,
     /// How far the clock of the calendar is ahead of the monotonic one [ns].
     pub(crate) calendar: i64,
     /// Cores that processes see.
@@ -172,6 +180,9 @@ impl World {
             failing: 0,
             dropping: 0,
             preempting: 0,
+            longest: 14,
+            losses: Vec::new(),
+            halts: Vec::new(),
             calendar: 0,
             cores,
             lateness: 1_000_000,
@@ -201,13 +212,16 @@ impl World {
         }
     }
 
-    /// Takes the core of the calling thread away for a while, from microseconds to 16 ms; whether it did.
+    /// Takes the core of the calling thread away for a while, from microseconds on; whether it did.
     fn lose_core(&mut self) -> bool {
         if self.preempting == 0 || self.rng.u32(0..1_000_000) >= self.preempting {
             return false;
         }
-        let time = 1000 << self.rng.u32(0..14);
+        let time = 1000 << self.rng.u32(0..self.longest);
         let until = self.now + self.rng.u64(time..2 * time);
+        if time >= LOSS_MIN {
+            self.losses.push((self.now, until));
+        }
         self.task(me()).wake = until;
         true
     }

@@ -87,6 +87,8 @@ impl Caller {
             "{what} waited for {others} calls of another thread"
         );
         let holds = client.holds_lease();
+        let keeps = !self.is_shared && what != "release" && result.is_ok();
+        assert!(holds || !keeps, "{what} gave the lease back");
         // the daemon may grant yet what nobody waits for any more
         let is_abandoned = matches!(
             result,

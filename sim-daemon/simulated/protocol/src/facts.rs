@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use sim_machine::fs;
+use sim_machine::lost;
 use sim_machine::process;
 use sim_machine::process::Handle;
 use sim_machine::time::now;
@@ -56,7 +57,10 @@ struct Known {
     stopped: Vec<(u64, u64, u32)>,
     /// Until when a client may hold a lease [ns].
     holds: BTreeMap<ClientId, u64>,
-    clients: u64,
+    /// When a client lost its lease last [ns].
+    lost: BTreeMap<ClientId, u64>,
+    /// Processes of clients, in the order of their numbers.
+    clients: Vec<Handle>,
     /// Daemons that served, by their run, and since when [ns].
     serving: BTreeMap<u64, (Handle, u64)>,
     /// Runs whose end somebody asked for.
@@ -141,7 +145,8 @@ impl Facts {
     /// From then on nobody is stopped, and shared memory has room [ns].
     pub fn calm_at(&self) -> u64 {
         self.known(|known| {
-            let ends = known.stopped.iter().map(|stop| stop.1);
+            let stops = known.stops();
+            let ends = stops.iter().map(|stop| stop.1);
             ends.fold(known.squeezed, u64::max)
         })
     }
@@ -174,8 +179,17 @@ impl Facts {
     /// A client of this process, which holds nothing.
     pub fn client(&self) -> ClientId {
         self.known(|known| {
-            known.clients += 1;
-            (process::id(), known.clients)
+            known.clients.push(Handle::this());
+            (process::id(), known.clients.len() as u64)
+        })
+    }
+
+    /// A process that may hold the lease now.
+    pub fn holder(&self) -> Option<Handle> {
+        self.known(|known| {
+            let holding = known.holds.iter().filter(|holds| *holds.1 == u64::MAX);
+            let mut holders = holding.map(|(client, _)| known.clients[client.1 as usize - 1]);
+            holders.find(|holder| holder.is_alive())
         })
     }
 
@@ -208,7 +222,7 @@ impl Facts {
             let excused =
                 |&(_, end, who): &(u64, u64, u32)| who != pid && end > stopped.unwrap_or(0);
             assert!(
-                stopped.is_none() || known.slow > 0 || known.stopped.iter().any(excused),
+                stopped.is_none() || known.slow > 0 || known.stops().iter().any(excused),
                 "process {pid} is silent and keeps {client:?} out"
             );
         });
@@ -217,16 +231,19 @@ impl Facts {
     /// A client lost its lease.
     ///
     /// # Panics
-    /// It was there all the time.
+    /// It was there all the time since it lost the last one.
     pub fn lost_lease(&self, client: ClientId) {
         self.known(|known| {
+            let now = now();
+            let before = known.lost.insert(client, now).unwrap_or(0);
             let time = |&(begin, end, pid): &(u64, u64, u32)| match pid == client.0 {
-                true => end.min(now()) - begin,
+                true => end.min(now).saturating_sub(begin.max(before)),
                 false => 0,
             };
-            let stopped: u64 = known.stopped.iter().map(time).sum();
+            let stopped: u64 = known.stops().iter().map(time).sum();
+            let is_loaded = lost(now.saturating_sub(SILENT).max(before), now) >= MISSED;
             assert!(
-                stopped >= MISSED,
+                stopped >= MISSED || is_loaded,
                 "{client:?} lost its lease, and was there"
             );
         });
@@ -301,12 +318,13 @@ impl Facts {
         self.known(|known| known.squeezed >= since)
     }
 
-    /// Time since then in which somebody was stopped [ns].
+    /// Time since then in which somebody was stopped, or had lost the core [ns].
     pub fn stopped_since(&self, since: u64) -> u64 {
         let now = now();
         let overlap =
             |&(begin, end, _): &(u64, u64, u32)| end.min(now).saturating_sub(begin.max(since));
-        self.known(|known| known.stopped.iter().map(overlap).sum())
+        let stopped: u64 = self.known(|known| known.stops().iter().map(overlap).sum());
+        stopped + lost(since, now)
     }
 
     /// This daemon serves from now on; with its files before anybody came.
@@ -388,6 +406,13 @@ impl Facts {
 }
 
 impl Known {
+    /// When processes were stopped: begin and end [ns], and their number.
+    fn stops(&self) -> Vec<(u64, u64, u32)> {
+        let mut stops = self.stopped.clone();
+        stops.extend(process::halts());
+        stops
+    }
+
     fn last_daemon(&self) -> Option<(Handle, Handle)> {
         let mut all = self.daemons.iter().rev();
         let living = all.clone().find(|(_, daemon)| daemon.is_alive());

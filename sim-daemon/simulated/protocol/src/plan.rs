@@ -61,6 +61,8 @@ pub enum Act {
 pub enum Whom {
     /// A client, by its number.
     Client(usize),
+    /// The client that has the lease.
+    Holder,
     /// The daemon that runs.
     Daemon,
     /// The process that launched it.
@@ -76,6 +78,10 @@ pub enum Fate {
     KillAtDoor(Whom, u64),
     /// It is killed right after so many changes that others can see.
     KillAtChange(Whom, u64),
+    /// It is stopped right after so many of them, for so many milliseconds.
+    StopAtChange(Whom, u64, u64),
+    /// Another client begins, which asks for the lease for so many milliseconds.
+    Rival(u64),
     /// Another process ends the daemon.
     End,
     /// The same, and the daemon is killed after so many changes of its end.
@@ -113,6 +119,8 @@ pub struct Plan {
     pub dropping: u32,
     /// Doors in a million behind which a thread loses its core for a while.
     pub preempting: u32,
+    /// How long at most, as a power of two [µs].
+    pub longest: u32,
     /// How late sleepers wake, at most [µs].
     pub lateness: u64,
     /// How long a reset takes [ms].
@@ -135,7 +143,8 @@ impl Plan {
                 .collect(),
             failing: *rng.choice(&[0, 0, 0, 50, 500, 5000]).unwrap_or(&0),
             dropping: *rng.choice(&[0, 0, 10_000, 200_000]).unwrap_or(&0),
-            preempting: *rng.choice(&[0, 0, 200, 3000]).unwrap_or(&0),
+            preempting: *rng.choice(&[0, 0, 200, 3000, 10_000]).unwrap_or(&0),
+            longest: *rng.choice(&[14, 14, 18]).unwrap_or(&14),
             lateness: *rng.choice(&[100, 1000, 20_000]).unwrap_or(&100),
             slow: match rng.u32(0..6) {
                 0 => rng.u64(1..3000),
@@ -222,7 +231,7 @@ const ACTS: [(u32, fn(&mut Rng) -> Act); 24] = [
 ];
 
 /// What befalls processes, with its weight.
-const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 13] = [
+const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 15] = [
     (35, |rng, clients| Fate::Kill(whom(rng, clients))),
     (20, |rng, clients| {
         Fate::KillAtDoor(victim(rng, clients), doors(rng))
@@ -230,9 +239,11 @@ const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 13] = [
     (20, |rng, clients| {
         Fate::KillAtChange(victim(rng, clients), changes(rng))
     }),
-    (25, |rng, clients| {
-        Fate::Stop(whom(rng, clients), *rng.choice(&STOPS).unwrap_or(&10))
+    (25, |rng, clients| Fate::Stop(whom(rng, clients), stop(rng))),
+    (15, |rng, clients| {
+        Fate::StopAtChange(victim(rng, clients), changes(rng), stop(rng))
     }),
+    (12, |rng, _| Fate::Rival(rng.u64(0..8000))),
     (15, |rng, clients| Fate::Again(rng.usize(0..clients))),
     (12, |_, _| Fate::Launch),
     (4, |rng, _| Fate::LaunchDoomed(changes(rng))),
@@ -305,9 +316,14 @@ fn changes(rng: &mut Rng) -> u64 {
     rng.u64(1..=most)
 }
 
+fn stop(rng: &mut Rng) -> u64 {
+    *rng.choice(&STOPS).unwrap_or(&10)
+}
+
 fn whom(rng: &mut Rng, clients: usize) -> Whom {
     match rng.u32(0..10) {
-        0..6 => Whom::Client(rng.usize(0..clients)),
+        0..4 => Whom::Client(rng.usize(0..clients)),
+        4..6 => Whom::Holder,
         6..9 => Whom::Daemon,
         _ => Whom::Owner,
     }
@@ -315,8 +331,9 @@ fn whom(rng: &mut Rng, clients: usize) -> Whom {
 
 /// An owner does nothing at whose doors it could die.
 fn victim(rng: &mut Rng, clients: usize) -> Whom {
-    match rng.u32(0..3) {
-        0 => Whom::Daemon,
+    match rng.u32(0..6) {
+        0..2 => Whom::Daemon,
+        2 => Whom::Holder,
         _ => Whom::Client(rng.usize(0..clients)),
     }
 }

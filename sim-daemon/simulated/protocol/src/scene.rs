@@ -41,6 +41,7 @@ pub fn run(plan: &Plan, trace: bool) -> (Outcome, u64) {
         failing: plan.failing,
         dropping: plan.dropping,
         preempting: plan.preempting,
+        longest: plan.longest,
         lateness: 1000 * plan.lateness,
         steps_max: STEPS_MAX,
         trace,
@@ -70,8 +71,8 @@ fn play(plan: &Plan, facts: &Facts) {
         orphans,
     };
     cast.launch(u64::MAX);
-    for number in 0..plan.clients.len() {
-        let client = cast.begin(number);
+    for acts in &plan.clients {
+        let client = cast.begin(acts.clone());
         cast.clients.push(client);
     }
     for (after, fate) in &plan.fates {
@@ -134,15 +135,15 @@ impl Cast<'_> {
         note(|| format!("owner {}", owner.pid));
     }
 
-    fn begin(&self, number: usize) -> Handle {
+    fn begin(&self, acts: Vec<Act>) -> Handle {
         let facts = self.facts.clone();
-        let acts: Vec<Act> = self.plan.clients[number].clone();
         process::start(move || Actor::new(&facts).play(&acts))
     }
 
     fn who(&self, whom: Whom) -> Option<Handle> {
         match whom {
             Whom::Client(number) => self.clients.get(number).copied(),
+            Whom::Holder => self.facts.holder(),
             Whom::Daemon => self.facts.daemon(),
             Whom::Owner => self.facts.owner(),
         }
@@ -169,6 +170,17 @@ impl Cast<'_> {
                 let who = self.who(whom);
                 who.into_iter().for_each(|who| who.kill_at_change(changes));
             }
+            Fate::StopAtChange(whom, changes, time) => {
+                let who = self.who(whom);
+                let time = Duration::from_millis(time);
+                who.into_iter()
+                    .for_each(|who| who.stop_at_change(changes, time));
+            }
+            Fate::Rival(time) => {
+                let acts = vec![Act::Attach(1000), Act::Insist(time), Act::Steps(3)];
+                let rival = self.begin(acts);
+                self.clients.push(rival);
+            }
             Fate::End => self.end_daemon(),
             Fate::EndDoomed(changes) => {
                 let daemon = self.facts.daemon();
@@ -187,7 +199,7 @@ impl Cast<'_> {
             Fate::Again(number) => {
                 if let Some(before) = self.clients.get(number).filter(|client| !client.is_alive()) {
                     note(|| format!("in place of {before:?}"));
-                    self.clients[number] = self.begin(number);
+                    self.clients[number] = self.begin(self.plan.clients[number].clone());
                 }
             }
             Fate::Launch => self.launch(u64::MAX),

@@ -12,6 +12,7 @@ pub fn run(seed: u64, failing: u32) -> Run {
         failing,
         dropping: 0,
         preempting: 0,
+        longest: 14,
         lateness: 1_000_000,
         steps_max: 200_000,
         trace: false,
