@@ -429,6 +429,10 @@ fn gltf_images_lie_in_the_file_or_beside_it() {
     };
     assert_eq!(file_of(&beside.image), folder.as_ref().join("skin.png"));
     assert!(see(r#""uri":"data:image/png,broken""#, "").is_empty());
+    // what an image should say of itself, and does not
+    let untyped = see(r#""bufferView":2"#, "");
+    assert_eq!(untyped[0].image, Image::Bytes(places.clone()));
+    assert!(see(r#""name":"nowhere""#, "").is_empty());
 }
 
 #[test]

@@ -221,7 +221,53 @@ fn broken_gltf_is_refused() {
     let (mesh, node) = (brick(), r#"{"mesh":0}"#);
     let (json, buffer) = (gltf(&mesh, "", node), gltf_buffer(&mesh));
     let whole = glb(&json, &buffer);
-    assert_refused("cut.glb", &whole[..whole.len() - 40], &["is not glTF 2.0"]);
+    let (all, json_end) = (whole.len(), whole.len() - 8 - buffer.len());
+    let headed = |length: usize, rest: &[u8]| {
+        let length = (length as u32).to_le_bytes();
+        [&whole[..8], &length, rest].concat()
+    };
+    let cut = [
+        (
+            whole[..all - 40].to_vec(),
+            format!("it should have {all} bytes and has {}; copy", all - 40),
+        ),
+        (
+            whole[..8].to_vec(),
+            "it should have 12 bytes and has 8; copy".to_owned(),
+        ),
+        (
+            headed(11, &whole[12..]),
+            "its header gives it 11 bytes, and has 12 itself; export".to_owned(),
+        ),
+        (
+            headed(12, &[]),
+            "its JSON part should have 8 bytes and has 0; copy".to_owned(),
+        ),
+        (
+            headed(100, &whole[12..100]),
+            format!(
+                "its JSON part should have {} bytes and has 88; copy",
+                json_end - 12
+            ),
+        ),
+        (
+            headed(json_end + 3, &whole[12..json_end + 3]),
+            "its binary part should have 8 bytes and has 3; copy".to_owned(),
+        ),
+        (
+            headed(all - 40, &whole[12..all - 40]),
+            format!(
+                "its binary part should have {} bytes and has {}; copy",
+                all - json_end,
+                all - json_end - 40
+            ),
+        ),
+    ];
+    for (bytes, message) in cut {
+        assert_refused("cut.glb", bytes, &[&message]);
+    }
+    let first = [&whole[..4], &1_u32.to_le_bytes(), &whole[8..]].concat();
+    assert_refused("first.glb", first, &["is not glTF 2.0", "version"]);
     assert_refused("word.gltf", "{", &["is not glTF 2.0"]);
     assert_refused(
         "short.glb",

@@ -72,7 +72,7 @@ impl Channel {
     fn row(&self, corner: &[u32]) -> Option<&[f64]> {
         let index = *corner.get(self.offset)? as usize;
         let first = index.checked_mul(self.rows.stride)?;
-        self.rows.values.get(first..first + self.rows.stride)
+        self.rows.values.get(first..)?.get(..self.rows.stride)
     }
 }
 

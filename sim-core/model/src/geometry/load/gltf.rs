@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
+use gltf::json::image::MimeType;
 use gltf::json::validation::Checked;
 use gltf::mesh::{Mode, Semantic};
 use gltf::scene::Transform;
@@ -23,19 +24,28 @@ use super::{Limits, RawMesh, Run};
 const DEPTH_MAX: usize = 100;
 /// Places of further copies of a node's mesh.
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+/// How a binary file begins; its version and its length follow, then chunks.
+const MAGIC: &[u8] = b"glTF";
+/// Bytes before the first chunk, and before what a chunk holds.
+const HEAD: usize = 12;
+const CHUNK_HEAD: usize = 8;
 /// Most scene nodes visited: those that refer to one another can stand for billions.
 const VISITS_MAX: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMesh, String> {
     let bytes = unmarked(bytes)?;
+    if bytes.starts_with(MAGIC) {
+        check_lengths(bytes)?;
+    }
     let broken = |error: gltf::Error| format!("is not glTF 2.0: {error}; export it again");
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(broken)?;
     // the check of the whole file would call an extension that is not read an error of the file
     if let Some(needed) = needed(&document) {
         return Err(needed);
     }
-    let document = document.into_json();
+    let mut document = document.into_json();
     check_positions(&document)?;
+    complete_images(&mut document);
     let document = Document::from_json(document).map_err(broken)?;
     if document
         .extensions_used()
@@ -58,6 +68,46 @@ pub(super) fn read(bytes: &[u8], folder: &Path, limits: Limits) -> Result<RawMes
     Ok(scene.mesh)
 }
 
+/// Refuses a binary file that was cut: the gltf crate subtracts from its length, and names no number.
+fn check_lengths(bytes: &[u8]) -> Result<(), String> {
+    let number = |at: usize| {
+        let word = bytes.get(at..at + 4)?.first_chunk()?;
+        Some(u32::from_le_bytes(*word) as usize)
+    };
+    let short = |part: &str, least: usize, present: usize| {
+        format!("{part} should have {least} bytes and has {present}; copy or export it again")
+    };
+    let declared = number(8).unwrap_or_default();
+    if bytes.len() < declared.max(HEAD) {
+        return Err(short("it", declared.max(HEAD), bytes.len()));
+    }
+    if declared < HEAD {
+        return Err(format!(
+            "its header gives it {declared} bytes, and has {HEAD} itself; export it again"
+        ));
+    }
+    if number(4) != Some(2) {
+        // its parts are others, and the gltf crate refuses it
+        return Ok(());
+    }
+    // what follows the two chunks is not read
+    let mut start = HEAD;
+    for part in ["its JSON part", "its binary part"] {
+        let rest = bytes.len() - start;
+        match number(start) {
+            None if start > HEAD && rest == 0 => {}
+            Some(length) if rest >= CHUNK_HEAD && length <= rest - CHUNK_HEAD => {
+                start += CHUNK_HEAD + length;
+            }
+            length => {
+                let least = length.unwrap_or_default().saturating_add(CHUNK_HEAD);
+                return Err(short(part, least, rest));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// What is wrong with a file that cannot be read without some extension.
 fn needed(document: &Document) -> Option<String> {
     let extension = document.extensions_required().next()?;
@@ -77,6 +127,19 @@ fn check_positions(document: &gltf::json::Root) -> Result<(), String> {
             "a mesh has its positions in accessor {place}, and there are {count}; export it again"
         )),
         None => Ok(()),
+    }
+}
+
+/// Gives images what the gltf crate relies on: one in a buffer a type, which is seen in its bytes, and one that is nowhere the
+/// address of nothing.
+fn complete_images(document: &mut gltf::json::Root) {
+    for image in &mut document.images {
+        if image.buffer_view.is_some() {
+            let unknown = || MimeType(String::new());
+            image.mime_type.get_or_insert_with(unknown);
+        } else {
+            image.uri.get_or_insert_with(|| "data:".to_owned());
+        }
     }
 }
 
@@ -163,9 +226,10 @@ impl Scene<'_> {
             let (first, count) = (raw.vertices.len() as u32, positions.count());
             // several primitives may tell of the same numbers, so the limits come before reading
             let corners = primitive.indices().map_or(count, |indices| indices.count());
-            self.limits.vertices(raw.vertices.len() + count)?;
             self.limits
-                .triangles(raw.triangles.len() + corners / step)?;
+                .vertices(raw.vertices.len().saturating_add(count))?;
+            self.limits
+                .triangles(raw.triangles.len().saturating_add(corners / step))?;
             raw.vertices.append(&mut self.buffers.points(&positions)?);
             let indices: Vec<u32> = match primitive.indices() {
                 Some(indices) => self.buffers.indices(&indices)?,
