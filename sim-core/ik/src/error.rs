@@ -72,6 +72,14 @@ pub enum IkError {
         /// The most of a problem.
         max: usize,
     },
+    /// More threads than a system gives.
+    #[error("{threads} threads are asked for; give 1 to {max}, or leave `threads` out")]
+    Threads {
+        /// What was asked for.
+        threads: usize,
+        /// The most.
+        max: usize,
+    },
     /// Its caller no longer waits for it.
     #[error("it was stopped before all problems were solved; ask again")]
     Stopped,

@@ -15,6 +15,8 @@ use std::thread;
 
 /// Iterations of all attempts at one problem at most: about a second [–].
 const WORK_MAX: usize = 1_000_000;
+/// Threads at most, as of a daemon: a system that gives no more of them would end the process [–].
+const THREADS_MAX: usize = 1024;
 
 /// Precision of the iterations. Errors are evaluated in double precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,7 +66,7 @@ impl Solver {
     /// the same bit for bit for any number of problems, lanes and threads.
     ///
     /// # Errors
-    /// [`IkError::Lanes`], [`IkError::Length`], [`IkError::Value`], [`IkError::Work`].
+    /// [`IkError::Lanes`], [`IkError::Length`], [`IkError::Value`], [`IkError::Work`], [`IkError::Threads`].
     pub fn solve(
         &self,
         problems: &Problems,
@@ -90,6 +92,10 @@ impl Solver {
         threads: usize,
     ) -> Result<(Vec<f64>, Vec<Solution>), IkError> {
         self.check(problems, &options)?;
+        if threads > THREADS_MAX {
+            let max = THREADS_MAX;
+            return Err(IkError::Threads { threads, max });
+        }
         let coords = self.model.coords();
         let count = problems.count;
         let mut joint_q = vec![0.0; count * coords];

@@ -288,6 +288,21 @@ fn more_work_than_a_problem_may_have_is_refused_with_the_bound() {
 }
 
 #[test]
+fn more_threads_than_a_system_gives_are_refused() {
+    let model = fr3();
+    let solver = Solver::new(Arc::clone(&model), &task(&model, &["robot/fr3_hand_tcp"])).unwrap();
+    let start = model.start().joint_q.clone();
+    let (place, turn) = ([[9.0; 3].as_slice()], [[0.0, 0.0, 0.0, 1.0].as_slice()]);
+    let problems = out_of_reach(&start, &place, &turn, 100_000);
+    let solved = solver.solve(&problems, OPTIONS, Precision::F32, Width::Auto, 100_000);
+    let error = solved.unwrap_err().to_string();
+    assert!(
+        error.contains("100000 threads are asked for; give 1 to 1024"),
+        "{error}"
+    );
+}
+
+#[test]
 fn work_that_is_stopped_ends_soon_in_every_thread_and_precision() {
     let model = fr3();
     let solver = Solver::new(Arc::clone(&model), &task(&model, &["robot/fr3_hand_tcp"])).unwrap();
