@@ -2,17 +2,18 @@
 //! Scene files are not here: [`crate::config`] is public anyway.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use sim_engine::simulation::{Options, Simulation};
 use sim_physics::arrays::Field;
-use sim_protocol::host::Inbox;
-use sim_protocol::{CommandHeader, Description, Op};
+use sim_protocol::host::{self, Inbox};
+use sim_protocol::{Command, CommandHeader, Description, Op};
 
 use crate::config;
-use crate::export::{self, Advance, RunInfo};
+use crate::error::DaemonError;
+use crate::export::{self, Advance, RunInfo, snapshot};
 use crate::recording;
-use crate::serve::{Exchange, Ik, check_rollout};
+use crate::serve::{Exchange, Ik, Rollouts, Steps};
 
 /// Worlds of a scene, on which commands and files act. Whatever acts finds them in the same state.
 pub struct Worlds {
@@ -43,7 +44,7 @@ impl Worlds {
         let info = RunInfo {
             scene: &described,
             scene_text: text.to_owned(),
-            scene_folder: String::new(),
+            scene_folder: folder.display().to_string(),
             device: String::new(),
             threads: 1,
             frames_held: 1,
@@ -89,6 +90,11 @@ impl Worlds {
         Ok(())
     }
 
+    /// What a daemon with these worlds announces.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
     /// The bytes of a snapshot of these worlds.
     pub fn snapshot(&self) -> &[u8] {
         &self.state
@@ -106,25 +112,84 @@ impl Worlds {
         Ok(())
     }
 
-    /// Answers a question of inverse kinematics; returns the length of the answer.
+    /// Answers a question of inverse kinematics, unless that takes long; returns the length of the answer.
     ///
     /// # Errors
     /// What the daemon answers.
     pub fn ik(&mut self, question: &Path) -> Result<usize, String> {
         self.begin_anew();
         let question = Exchange::read(question, 3)?;
-        let stop = AtomicBool::new(false);
+        let asked = AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) >= STOPS_AFTER;
         let answer = Ik::default().solve(&self.simulation, &question, &stop)?;
         Ok(answer.len())
     }
 
-    /// Checks the question of a rollout, up to its first step.
+    /// Carries out the first frames of a rollout; returns the length of the answer if these are all.
     ///
     /// # Errors
-    /// What the daemon answers.
-    pub fn rollout(&self, question: &Path) -> Result<(), String> {
+    /// What the daemon answers; it takes a client to have gone after [`FRAMES_MAX`] frames.
+    pub fn rollout(&mut self, question: &Path) -> Result<usize, String> {
+        self.begin_anew();
         let question = Exchange::read(question, 4)?;
-        check_rollout(&question, &self.simulation, &self.description)
+        let mut steps = Alone {
+            description: &self.description,
+            inbox: &mut self.inbox,
+            frames: 0,
+        };
+        let (simulation, mut rollouts) = (&mut self.simulation, Rollouts::default());
+        let answer = rollouts.carry_out(&question, false, simulation, &mut steps, 0);
+        match answer {
+            Ok(answer) => Ok(answer.len()),
+            Err(refusal) => Err(refusal.reason),
+        }
+    }
+}
+
+/// Frames of a rollout or a recording that are made here.
+pub const FRAMES_MAX: usize = 4;
+/// How often a solver may ask whether it is to go on: each time after some milliseconds.
+const STOPS_AFTER: usize = 16;
+/// Bytes of an answer for which there is room.
+const ANSWER_MAX: u64 = 1 << 24;
+
+/// Steps of a rollout without a host.
+struct Alone<'a> {
+    description: &'a Description,
+    inbox: &'a mut Inbox,
+    frames: usize,
+}
+
+impl Steps for Alone<'_> {
+    fn description(&self) -> &Description {
+        self.description
+    }
+
+    fn inbox(&self) -> &Inbox {
+        self.inbox
+    }
+
+    fn put_aside(&mut self) {}
+
+    fn put_step(&mut self, commands: &[Command<'_>]) -> Result<(), String> {
+        let header = CommandHeader::default();
+        self.inbox.put(self.description, header, Op::Step, commands)
+    }
+
+    fn carry_out(&mut self, arena: &mut [u64], worlds: &mut impl host::Worlds) -> bool {
+        self.frames += 1;
+        worlds.frame(arena, None);
+        self.frames <= FRAMES_MAX
+    }
+
+    fn take_back(&mut self) {}
+
+    fn check_room(&self, needed: u64) -> Result<(), String> {
+        snapshot::check_room(needed)?;
+        match needed > ANSWER_MAX {
+            true => Err(format!("needs {needed} bytes, more than a test has")),
+            false => Ok(()),
+        }
     }
 }
 
@@ -134,6 +199,30 @@ impl Worlds {
 /// What a replay reports.
 pub fn recording(bytes: &[u8]) -> Result<u64, String> {
     recording::count_records(bytes)
+}
+
+/// Replays the first [`FRAMES_MAX`] frames of a recording on its scene; returns how many are equal.
+///
+/// # Errors
+/// What a replay reports.
+pub fn replay(file: &Path) -> Result<u64, String> {
+    let equal = recording::first_frames(file, FRAMES_MAX as u64);
+    equal.map_err(|error| error.to_string())
+}
+
+/// Plays the first [`FRAMES_MAX`] frames of a recording; returns how many there are.
+///
+/// # Errors
+/// What an observer reports.
+pub fn playback(file: &Path) -> Result<usize, String> {
+    let fields = [Field::JointQ, Field::BodyQ];
+    let said = |error: DaemonError| error.to_string();
+    let mut played = recording::Playback::open(file, &fields, Some(1)).map_err(said)?;
+    let mut frames = 0;
+    while frames < FRAMES_MAX && played.advance().map_err(said)?.is_some() {
+        frames += 1;
+    }
+    Ok(frames)
 }
 
 /// A recording with one block of these records, whose checksums are right.

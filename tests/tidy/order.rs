@@ -328,6 +328,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "memory",
             "observation",
             "commands",
+            "steps",
             "run",
         ],
     ),

@@ -30,5 +30,5 @@ pub use playback::Playback;
 #[cfg(test)]
 pub(crate) use record::follow;
 pub(crate) use record::run as record;
-pub(crate) use replay::run as replay;
+pub(crate) use replay::{first_frames, run as replay};
 pub(crate) use writer::file_of;

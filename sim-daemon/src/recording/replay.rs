@@ -82,6 +82,18 @@ pub(crate) fn run(args: &cli::Replay) -> Result<(), DaemonError> {
     replay.tell_end(end)
 }
 
+/// Replays so many frames of a file, and says nothing; returns how many were equal.
+pub(crate) fn first_frames(file: &Path, frames: u64) -> Result<u64, DaemonError> {
+    let args = cli::Replay {
+        file: file.to_owned(),
+        threads: Some(1),
+        frames: Some(frames),
+    };
+    let mut replay = open(&args)?;
+    replay.go()?;
+    Ok(replay.frames)
+}
+
 /// Opens the file.
 pub(super) fn open(args: &cli::Replay) -> Result<Replay<'_, BufReader<File>>, DaemonError> {
     let path = args.file.as_path();

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Deserialize;
 use sim_engine::simulation::Simulation;
-use sim_ik::{IkError, Options, Precision, Problems, Solution, Solver, Width};
+use sim_ik::{IkError, Options, Precision, Problems, Solution, Solver, Stop, Width};
 use sim_protocol::RefusalKind;
 use sim_protocol::host::Inbox;
 
@@ -55,7 +55,8 @@ impl Ik {
         let path = snapshot::path(inbox)?;
         let refuse = |problem: String| refused(&format!("{}: {problem}", path.display()));
         let question = Exchange::read(path, 3).map_err(refuse)?;
-        let answer = self.solve(simulation, &question, stop);
+        let stop = || stop.load(Ordering::Relaxed);
+        let answer = self.solve(simulation, &question, &stop);
         let answer = answer.map_err(|problem| refused(&problem))?;
         question.answer(&answer).map_err(refuse)
     }
@@ -68,7 +69,7 @@ impl Ik {
         &mut self,
         simulation: &Simulation,
         question: &Exchange,
-        stop: &AtomicBool,
+        stop: Stop<'_>,
     ) -> Result<Vec<u8>, String> {
         let (question, task, arrays) =
             parse(question).ok_or("the file is no question; use sim.ik")??;
@@ -119,9 +120,8 @@ impl Ik {
             0 => simulation.threads(),
             asked => asked,
         };
-        let stop = || stop.load(Ordering::Relaxed);
         let width = Width::Auto;
-        let solved = solver.solve_until(&stop, &problems, options, precision, width, threads);
+        let solved = solver.solve_until(stop, &problems, options, precision, width, threads);
         let (joint_q, solutions) = solved.map_err(said)?;
         Ok(rows(coords, &joint_q, &solutions))
     }

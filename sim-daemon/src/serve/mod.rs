@@ -17,5 +17,5 @@ mod watchdog;
 
 pub(crate) use exchange::Exchange;
 pub(crate) use ik::Ik;
-pub(crate) use rollout::check as check_rollout;
+pub(crate) use rollout::{Rollouts, Steps};
 pub(crate) use session::{read_scene, run};

@@ -151,7 +151,7 @@ impl Inbox {
     ///
     /// # Errors
     /// As [`Inbox::take`], and what does not fit.
-    pub(super) fn put(
+    pub fn put(
         &mut self,
         description: &Description,
         header: CommandHeader,

@@ -13,5 +13,7 @@ mod memory;
 mod observation;
 mod question;
 mod run;
+mod steps;
 
-pub(crate) use run::{Rollouts, check};
+pub(crate) use run::Rollouts;
+pub(crate) use steps::Steps;

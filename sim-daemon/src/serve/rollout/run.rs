@@ -6,13 +6,14 @@ use sim_engine::simulation::{Precision, Simulation};
 use sim_physics::arrays::status;
 use sim_policy::Runner;
 use sim_protocol::host::{FrameMemory, Host, Worlds};
-use sim_protocol::{Description, RefusalKind, Table};
+use sim_protocol::{RefusalKind, Table};
 
 use super::answer::Answer;
 use super::commands::Commands;
 use super::memory::{Memory, Places};
 use super::observation::{Observation, Real};
 use super::question::Asked;
+use super::steps::Steps;
 use crate::export::refusal::{Refusal, refusal};
 use crate::export::{self, Advance, snapshot};
 use crate::serve::exchange::Exchange;
@@ -41,24 +42,37 @@ impl Rollouts {
         let path = snapshot::path(host.inbox())?.to_owned();
         let in_file = |problem: String| refused(&format!("{}: {problem}", path.display()));
         let exchange = Exchange::read(Path::new(&path), 4).map_err(in_file)?;
-        let asked = Asked::parse(&exchange, simulation.worlds());
-        let asked = asked.map_err(|problem| refused(&problem))?;
         let (epoch, seq) = (host.inbox().header().epoch, host.inbox().header().seq);
+        let follows = left == Some((epoch, seq.wrapping_sub(1)));
+        let bytes = self.carry_out(&exchange, follows, simulation, host, watched)?;
+        exchange.answer(&bytes).map_err(in_file)?;
+        self.left = Some((epoch, seq));
+        Ok(advance)
+    }
+
+    /// Carries out the rollout that a file asks for, and returns the answer. `follows` where nothing has moved the worlds since
+    /// the last one.
+    pub(crate) fn carry_out(
+        &mut self,
+        exchange: &Exchange,
+        follows: bool,
+        simulation: &mut Simulation,
+        steps: &mut impl Steps,
+        watched: usize,
+    ) -> Result<Vec<u8>, Refusal> {
+        let asked = Asked::parse(exchange, simulation.worlds());
+        let asked = asked.map_err(|problem| refused(&problem))?;
         // a rollout comes in pieces, or goes on with memory: an evaluation between them might reset faulted worlds
         let is_next = asked.question.first > 0 || !asked.memory.is_empty();
-        let goes_on = is_next && left == Some((epoch, seq.wrapping_sub(1)));
-        if !goes_on {
+        if !(is_next && follows) {
             self.arena.resize(simulation.layout().bytes.div_ceil(8), 0);
             // the policy sees the present state, which no frame may have shown
             simulation.forward(&mut self.arena);
         }
-        let bytes = match simulation.precision() {
-            Precision::F32 => self.run::<f32>(&asked, simulation, host, watched)?,
-            Precision::F64 => self.run::<f64>(&asked, simulation, host, watched)?,
-        };
-        exchange.answer(&bytes).map_err(in_file)?;
-        self.left = Some((epoch, seq));
-        Ok(advance)
+        match simulation.precision() {
+            Precision::F32 => self.run::<f32>(&asked, simulation, steps, watched),
+            Precision::F64 => self.run::<f64>(&asked, simulation, steps, watched),
+        }
     }
 
     /// The worlds at the end of a rollout: its last frame, not another evaluation.
@@ -78,14 +92,14 @@ impl Rollouts {
         &mut self,
         asked: &Asked,
         simulation: &mut Simulation,
-        host: &mut Host,
+        steps: &mut impl Steps,
         watched: usize,
     ) -> Result<Vec<u8>, Refusal> {
         let refuse = |problem: String| refused(&problem);
         let (worlds, threads) = (simulation.worlds(), simulation.threads());
         let table = export::frame_table(simulation.layout());
         let mut observation = Observation::<R>::find(asked, &table).map_err(refuse)?;
-        let commands = Commands::find(asked, host.description()).map_err(refuse)?;
+        let commands = Commands::find(asked, steps.description()).map_err(refuse)?;
         let actions = asked.network.outputs();
         let inputs = asked.network.inputs();
         let terms = &asked.question.terms;
@@ -95,7 +109,9 @@ impl Rollouts {
         let rows = rows.saturating_mul(size_of::<f32>() as u64);
         // memory is there twice at the end: for the policy, and in the answer
         let others = rows.saturating_add(places.bytes(worlds).saturating_mul(2));
-        let answer = Answer::new(asked, worlds, &table, others, snapshot::check_room);
+        let answer = Answer::new(asked, worlds, &table, others, |needed| {
+            steps.check_room(needed)
+        });
         let answer = answer.map_err(refuse)?;
         let memory = Memory::new(places, worlds, asked.memory.clone());
         let mut memory = memory.map_err(refuse)?;
@@ -114,42 +130,20 @@ impl Rollouts {
             watched,
         };
         rollout.begin_anew(&self.arena);
-        host.put_aside();
+        steps.put_aside();
         let frames = asked.question.frames;
         let result = (0..frames).try_for_each(|frame| {
-            let step = rollout.step(frame, simulation, host, &mut self.arena, &mut self.mask);
+            let step = rollout.step(frame, simulation, steps, &mut self.arena, &mut self.mask);
             step.map_err(|mut refusal| {
                 let frame = asked.question.first.saturating_add(frame);
                 refusal.reason = format!("rollout: frame {frame}: {}", refusal.reason);
                 refusal
             })
         });
-        host.take_back();
+        steps.take_back();
         result?;
         Ok(rollout.answer.finish(memory.values()))
     }
-}
-
-/// Checks a question as far as it needs no host.
-///
-/// # Errors
-/// One sentence about what does not fit.
-pub(crate) fn check(
-    question: &Exchange,
-    simulation: &Simulation,
-    description: &Description,
-) -> Result<(), String> {
-    let worlds = simulation.worlds();
-    let asked = Asked::parse(question, worlds)?;
-    let table = export::frame_table(simulation.layout());
-    let observation = Observation::<f32>::find(&asked, &table)?;
-    Commands::find(&asked, description)?;
-    let (terms, actions) = (&asked.question.terms, asked.network.outputs());
-    let places = Places::lay_out(terms, observation.sizes(), actions, worlds)?;
-    let others = places.bytes(worlds);
-    Answer::new(&asked, worlds, &table, others, snapshot::check_room)?;
-    Memory::new(places, worlds, asked.memory.clone())?;
-    Ok(())
 }
 
 /// The end of a rollout, for the client.
@@ -195,7 +189,7 @@ impl<R: Real> Rollout<'_, R> {
         &mut self,
         frame: usize,
         simulation: &mut Simulation,
-        host: &mut Host,
+        steps: &mut impl Steps,
         arena: &mut [u64],
         mask: &mut Vec<bool>,
     ) -> Result<(), Refusal> {
@@ -206,8 +200,8 @@ impl<R: Real> Rollout<'_, R> {
         run.map_err(|error| problem_of(error.to_string()))?;
         self.act();
         self.commands.set(self.asked, &self.actions, frame);
-        host.put_step(&self.commands.all()).map_err(problem_of)?;
-        export::apply(simulation, host.inbox(), mask)?;
+        steps.put_step(&self.commands.all()).map_err(problem_of)?;
+        export::apply(simulation, steps.inbox(), mask)?;
         if let Some(sharing) = simulation.sharing() {
             sharing.stage_shared(&[]);
         }
@@ -216,7 +210,7 @@ impl<R: Real> Rollout<'_, R> {
             advance: Advance::Step,
             watched: self.watched,
         };
-        let is_waited_for = host.carry_out(arena, &mut shown);
+        let is_waited_for = steps.carry_out(arena, &mut shown);
         if let Some(lost) = simulation.lost() {
             return Err(refusal(RefusalKind::Backend, lost.to_string()));
         }
