@@ -154,9 +154,14 @@ fn parse(question: &Exchange) -> Option<Result<(Question, &str, Vec<Vec<f64>>), 
         }
     };
     let arrays = arrays(rest, &question.lengths)?;
-    // the task comes first: what follows differs from call to call
-    let task = text.split_once(",\"count\"").map_or(text, |(task, _)| task);
-    Some(Ok((question, task, arrays)))
+    Some(Ok((question, task_of(text), arrays)))
+}
+
+/// The text of a question's task, and all of it where that does not come first: what follows differs from call to call.
+fn task_of(text: &str) -> &str {
+    let is_first = text.starts_with("{\"task\":");
+    let parts = text.split_once(",\"count\"").filter(|_| is_first);
+    parts.map_or(text, |(task, _)| task)
 }
 
 /// The answer.
@@ -184,4 +189,21 @@ fn said(error: IkError) -> String {
 
 fn refused(problem: &str) -> Refusal {
     refusal(RefusalKind::Backend, format!("ik: {problem}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn questions_with_the_same_task_text_have_the_same_task() {
+        let first = r#"{"task":{"moves":[true]},"count":2,"seed":1}"#;
+        assert_eq!(task_of(first), r#"{"task":{"moves":[true]}"#);
+        for last in [
+            r#"{"seed":1,"count":2,"task":{"moves":[true]}}"#,
+            r#"{"seed":1,"count":2,"task":{"moves":[false]}}"#,
+        ] {
+            assert_eq!(task_of(last), last);
+        }
+    }
 }
