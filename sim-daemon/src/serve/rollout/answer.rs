@@ -64,7 +64,8 @@ impl Answer {
         check_room: impl Fn(u64) -> Result<(), String>,
     ) -> Result<Answer, String> {
         let (arrays, bytes) = Answer::lay_out(asked, worlds, table)?;
-        check_room(others.saturating_add(2 * bytes as u64))?;
+        let copies = (bytes as u64).saturating_mul(2);
+        check_room(others.saturating_add(copies))?;
         Ok(Answer {
             arrays,
             bytes: vec![0; bytes],
