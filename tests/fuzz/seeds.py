@@ -4,12 +4,12 @@ Seeds are small inputs that reach far into a reader. Inputs that once broke one 
 stay as they are.
 """
 
-import base64
 import json
 import struct
 from collections.abc import Sequence
 from pathlib import Path
 
+import mesh_seeds
 import onnx_seeds
 
 FUZZ = Path(__file__).parent
@@ -169,99 +169,10 @@ def policies() -> None:
         write("onnx", name, data)
 
 
-CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
-
-
 def meshes() -> None:
-    """A tetrahedron in each format."""
-    facets, records = "", b""
-    for face in FACES:
-        corners = [CORNERS[corner] for corner in face]
-        vertices = "".join("vertex {} {} {}\n".format(*corner) for corner in corners)
-        facets += f"facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n"
-        records += struct.pack("<12fH", 0, 0, 1, *(x for corner in corners for x in corner), 0)
-    write("mesh_stl", "text.stl", f"solid a\n{facets}endsolid a\n")
-    write("mesh_stl", "binary.stl", bytes(80) + struct.pack("<I", len(FACES)) + records)
-    vertices = "".join("v {} {} {}\n".format(*corner) for corner in CORNERS)
-    faces = "".join("f {} {} {}\n".format(*(corner + 1 for corner in face)) for face in FACES)
-    textured = "".join("f {}/1 {}/2/1 {}/-1\n".format(*(corner + 1 for corner in face)) for face in FACES)
-    write("mesh_obj", "plain.obj", vertices + faces)
-    write(
-        "mesh_obj",
-        "materials.obj",
-        f"mtllib mesh.mtl\n{vertices}vt 0 0\nvt 1 0\nusemtl red\n{faces}usemtl wood\n{textured}\n#mtl\n"
-        "newmtl red\nKd 1 0 0\nd 0.5\nnewmtl wood\nTr 0.2\nmap_Kd -s 1 1 1 wood.png\n",
-    )
-    write("mesh_obj", "colors.obj", vertices.replace("\n", " 1 0.5 0\n") + "f 1 2 \\\n3 4\n")
-    numbers = " ".join(str(x) for corner in CORNERS for x in corner)
-    corners = " ".join(str(corner) for face in FACES for corner in face)
-    effect = (
-        '<effect id="e"><profile_COMMON><technique sid="t"><lambert><diffuse><color>1 0 0 1</color></diffuse></lambert>'
-        "</technique></profile_COMMON></effect>"
-    )
-    columns = "".join(f'<param name="{name}" type="float"/>' for name in "XYZ")
-    accessor = f'<accessor source="#p-array" count="4" stride="3">{columns}</accessor>'
-    accessor = f"<technique_common>{accessor}</technique_common>"
-    vertex = '<input semantic="VERTEX" source="#v" offset="0"/>'
-    bound = '<instance_material symbol="m" target="#m"/>'
-    bound = f"<bind_material><technique_common>{bound}</technique_common></bind_material>"
-    pieces = {
-        "triangles": f'<triangles count="4" material="m">{vertex}<p>{corners}</p></triangles>',
-        "polylist": f'<polylist count="4" material="m">{vertex}<vcount>3 3 3 3</vcount><p>{corners}</p></polylist>',
-    }
-    for name, piece in pieces.items():
-        write(
-            "mesh_dae",
-            name + ".dae",
-            f"""<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="0.01" name="centimeter"/><up_axis>Y_UP</up_axis></asset>
-<library_effects>{effect}</library_effects>
-<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="p-array" count="12">{numbers}</float_array>{accessor}</source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-{piece}
-</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>
-<rotate>0 0 1 90</rotate><translate>1 2 3</translate><scale>1 1 2</scale>
-<instance_geometry url="#g">{bound}</instance_geometry>
-</node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene>
-</COLLADA>
-""",
-        )
-    positions = struct.pack("<12f", *(x for corner in CORNERS for x in corner))
-    indices = struct.pack("<12H", *(corner for face in FACES for corner in face))
-    buffer = positions + indices
-    scene = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [
-            {"children": [1], "scale": [1, 1, 2]},
-            {"mesh": 0, "translation": [1, 0, 0], "rotation": [0, 0, 0, 1]},
-        ],
-        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.5]}}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0, "mode": 4}]}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": len(positions)},
-            {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices)},
-        ],
-        "buffers": [{"byteLength": len(buffer)}],
-    }
-    text = json.dumps(scene).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(buffer), b"BIN\0") + buffer
-    write("mesh_gltf", "binary.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-    uri = "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()
-    embedded = scene | {"buffers": [{"byteLength": len(buffer), "uri": uri}]}
-    write("mesh_gltf", "embedded.gltf", json.dumps(embedded))
+    """Write a tetrahedron in each format."""
+    for (target, name), data in mesh_seeds.files().items():
+        write(target, name, data)
 
 
 def robots() -> None:
@@ -394,6 +305,23 @@ def recordings() -> None:
     write("recording", "cut.tlrec", block)
 
 
+def replays() -> None:
+    """Recordings whose heads are changed, with steps, resets, gaps and ends."""
+    efforts = sample([("joint_f", F32, [2, 8], struct.pack("<16f", *range(16)))])
+    step = bytes((0, 1, 1, 10, len(efforts) // 8)) + efforts
+    seed = sample([("seed", U64, [1], struct.pack("<Q", 7)), ("mask", U8, [2], b"\1\0")])
+    reset = bytes((0, 2, 2, 10, len(seed) // 8)) + seed
+    forward, gap, state, end = bytes((0, 4, 0, 10, 0)), b"\3\0\0\0\1" + bytes(8), b"\4\0\0\0\0", b"\6\0\0\0\0"
+    write("replay", "compared", b"{}\0\0" + step + end)
+    write("replay", "shown", b"{}\0\1" + step + reset + forward + end)
+    write("replay", "gap", b"{}\0\1" + step + gap + step + state + step)
+    write("replay", "gap_compared", b"{}\0\0" + gap + step + state + gap)
+    write("replay", "no_state", b"{}\0\2" + step)
+    changes = {"worlds": 3, "draws": "world", "precision": "f64", "on_fault": "reset", "joint_qd_max": 5}
+    write("replay", "head", json.dumps(changes).encode() + b"\0\1" + step)
+    write("replay", "scene", json.dumps({"scene": CUBE.replace("robot.urdf", "none.urdf")}).encode() + b"\0\1" + step)
+
+
 def applied() -> None:
     """Commands for two worlds of eight dofs, and a snapshot's head."""
     efforts = ("joint_f", F32, [2, 8], struct.pack("<16f", *range(16)))
@@ -407,8 +335,14 @@ def applied() -> None:
         ("forward", 4, []),
     ):
         write("command_applied", name, bytes((operation, len(arrays))) + sample(arrays))
+    gravity = ("gravity", F32, [2, 3], struct.pack("<6f", 0, 0, -1, 0, 0, 1))
+    delay = ("command_delay", F32, [2, 1], struct.pack("<2f", 1, 0))
+    write("command_applied", "parameters", bytes((3, 3)) + sample([gravity, delay, mask]))
+    targets = ("joint_target_q", F32, [2, 8], struct.pack("<16f", *range(16)))
+    write("command_applied", "two", bytes((1, 2)) + sample([efforts, targets]))
     head = b"tlsnap\r\n" + struct.pack("<2I2Q2I", 1, 0, 0, 2, 60, 4)
     write("snapshot", "head", head + bytes(2 * (28 + 4 * 60)))
+    write("snapshot", "same", bytes(600))
     stored = (ROOT / "tests" / "data" / "recorded" / "machine_start.tlsnap").read_bytes()
     write("snapshot", "machine.tlsnap", stored)
 
@@ -461,5 +395,6 @@ if __name__ == "__main__":
     programs()
     scenes()
     recordings()
+    replays()
     applied()
     questions()
