@@ -1,5 +1,6 @@
 //! The lock of a daemon's name, and cleaning up after a daemon that died.
 
+use std::io::ErrorKind::NotFound;
 use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
@@ -89,7 +90,7 @@ impl DaemonLock {
         let opened = private().create(true).truncate(false).open(&path);
         let file = match opened {
             // the last daemon there took the folder with it
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Err(error) if error.kind() == NotFound => {
                 private_folder(paths.root())?;
                 return Ok(None);
             }
@@ -226,8 +227,11 @@ fn remove_shared_files(paths: &DaemonPaths, mark: Option<File>) {
         false => fs::remove_file(entry.path()),
     };
     if let Ok(entries) = fs::read_dir(&folder) {
-        let mut others = entries.flatten().filter(|entry| entry.file_name() != PLACE);
-        if others.all(|entry| remove(entry).is_ok()) {
+        let others = entries.flatten().filter(|entry| entry.file_name() != PLACE);
+        // a client that closes removes its own files at the same time
+        let failures = others.filter_map(|entry| remove(entry).err());
+        // all are tried, also behind one that stays
+        if failures.filter(|error| error.kind() != NotFound).count() == 0 {
             let _ = fs::remove_file(folder.join(PLACE));
         }
     }
@@ -355,7 +359,7 @@ fn sweep_remains(folder: &Path) {
     });
     // one that starts makes its mark at once
     let modified = fs::symlink_metadata(folder.join(PLACE))
-        .is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
+        .is_err_and(|error| error.kind() == NotFound)
         .then(|| fs::metadata(folder).and_then(|status| status.modified()));
     let is_old = modified
         .is_some_and(|time| time.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > START_MAX)));

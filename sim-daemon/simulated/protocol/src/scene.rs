@@ -112,7 +112,7 @@ impl Cast<'_> {
     fn launch(&self, changes: u64) {
         let (facts, failing) = (self.facts.clone(), self.plan.failing > 0);
         let owner = process::start(move || {
-            let (owner, own) = (Handle::this(), facts.clone());
+            let (owner, own, at) = (Handle::this(), facts.clone(), now());
             let daemon = process::start(move || {
                 if !own.is_calm() {
                     Handle::this().kill_at_change(changes);
@@ -126,7 +126,7 @@ impl Cast<'_> {
                     Err(error) => assert!(may_fail, "the daemon ends: {error}"),
                 }
             });
-            facts.launched(owner, daemon);
+            facts.launched(owner, daemon, at);
             while daemon.is_alive() {
                 sleep(Duration::from_millis(100));
             }
@@ -189,12 +189,10 @@ impl Cast<'_> {
                     .for_each(|daemon| daemon.kill_at_change(changes));
                 self.end_daemon();
             }
-            Fate::Stop(whom, time) => {
-                let Some(who) = self.who(whom) else { return };
-                who.stop();
-                self.facts.stop(who.pid, 1_000_000 * time);
-                let again = Duration::from_millis(time);
-                sim_machine::at(again, move || who.resume());
+            Fate::Stop(whom, time) => self.stop(whom, time),
+            Fate::Overtake(time) => {
+                self.stop(Whom::Holder, time);
+                self.befall(Fate::Rival(time));
             }
             Fate::Again(number) => {
                 if let Some(before) = self.clients.get(number).filter(|client| !client.is_alive()) {
@@ -223,6 +221,13 @@ impl Cast<'_> {
                 sim_machine::at(Duration::from_millis(time), || fs::set_capacity(SHARED));
             }
         }
+    }
+
+    fn stop(&self, whom: Whom, time: u64) {
+        let Some(who) = self.who(whom) else { return };
+        who.stop();
+        self.facts.stop(who.pid, 1_000_000 * time);
+        sim_machine::at(Duration::from_millis(time), move || who.resume());
     }
 
     /// As a process does that is no client.

@@ -13,6 +13,9 @@ use sim_machine::time::now;
 
 use crate::plan::Plan;
 
+mod daemons;
+use daemons::Launched;
+
 /// Files in shared memory, by their kind: the ending of their name, or where they are.
 pub fn kinds_of_files() -> BTreeMap<String, usize> {
     let mut kinds = BTreeMap::new();
@@ -77,8 +80,7 @@ struct Known {
     is_calm: bool,
     /// How long a reset takes [ms].
     slow: u64,
-    /// As they were launched, each with its owner.
-    daemons: Vec<(Handle, Handle)>,
+    launched: Vec<Launched>,
     /// When the folder of daemons was removed last: nobody finds those from before [ns].
     logged_out: u64,
     /// When something last happened that a wait may have to sit out [ns].
@@ -285,10 +287,7 @@ impl Facts {
     /// One was.
     pub fn nobody_serves(&self, since: u64) {
         self.known(|known| {
-            let seen = known
-                .serving
-                .iter()
-                .filter(|run| run.1.1 >= known.logged_out);
+            let seen = known.serving.iter().filter(|run| !known.is_hidden(run.1.0));
             let mut sessions = seen.map(|(session, _)| session);
             let lives = sessions.find(|session| known.lives(**session, since));
             assert!(lives.is_none(), "the daemon of run {lives:x?} lives");
@@ -348,61 +347,6 @@ impl Facts {
     pub fn first_files(&self) -> BTreeMap<String, usize> {
         self.known(|known| known.files.clone())
     }
-
-    /// Notes the daemon and its owner.
-    pub fn launched(&self, owner: Handle, daemon: Handle) {
-        self.known(|known| known.daemons.push((owner, daemon)));
-    }
-
-    /// The daemon launched last of those that live, or of all.
-    pub fn daemon(&self) -> Option<Handle> {
-        self.known(|known| known.last_daemon().map(|(_, daemon)| daemon))
-    }
-
-    /// All that were launched.
-    pub fn daemons(&self) -> Vec<Handle> {
-        let daemons = |known: &mut Known| known.daemons.iter().map(|(_, daemon)| *daemon).collect();
-        self.known(daemons)
-    }
-
-    /// Its owner.
-    pub fn owner(&self) -> Option<Handle> {
-        self.known(|known| known.last_daemon().map(|(owner, _)| owner))
-    }
-
-    /// The daemon that serves whoever comes, and that nobody asked to end.
-    pub fn server(&self) -> Option<Handle> {
-        self.known(|known| {
-            let mut runs = known.serving.iter();
-            let serves = |(session, run): &(&u64, &(Handle, u64))| {
-                run.1 >= known.logged_out && run.0.is_alive() && !known.is_asked(**session, **run)
-            };
-            runs.find(serves).map(|(_, run)| run.0)
-        })
-    }
-
-    /// Whether a daemon lived at some time since then.
-    pub fn lived_since(&self, since: u64) -> bool {
-        let lived = |daemon: &Handle| {
-            daemon.is_alive() || process::dead_since(daemon.pid).is_none_or(|death| death >= since)
-        };
-        self.daemons().iter().any(lived)
-    }
-
-    /// The folder of daemons is removed.
-    pub fn log_out(&self) {
-        let now = now();
-        self.known(|known| known.logged_out = now);
-    }
-
-    /// Daemons that live and that nobody finds any more.
-    pub fn hidden(&self) -> Vec<Handle> {
-        self.known(|known| {
-            let runs = known.serving.values();
-            let hidden = runs.filter(|run| run.1 < known.logged_out && run.0.is_alive());
-            hidden.map(|run| run.0).collect()
-        })
-    }
 }
 
 impl Known {
@@ -411,12 +355,6 @@ impl Known {
         let mut stops = self.stopped.clone();
         stops.extend(process::halts());
         stops
-    }
-
-    fn last_daemon(&self) -> Option<(Handle, Handle)> {
-        let mut all = self.daemons.iter().rev();
-        let living = all.clone().find(|(_, daemon)| daemon.is_alive());
-        living.or(all.next()).copied()
     }
 
     fn is_asked(&self, session: u64, (daemon, since): (Handle, u64)) -> bool {
