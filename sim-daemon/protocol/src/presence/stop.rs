@@ -40,12 +40,19 @@ pub(crate) fn asked(paths: &DaemonPaths) -> Result<Asked<'_>, ProtocolError> {
 pub fn stop(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<(), ProtocolError> {
     let paths = DaemonPaths::new(options.root.as_deref(), name)?.daemon()?;
     // one that starts has no version yet
-    if !matches!(paths.presence()?, Presence::Starting) {
-        find(name, options, &mut *hook)?;
-    }
+    let running = match paths.presence()? {
+        Presence::Starting => None,
+        _ => Some(find(name, options, &mut *hook)?),
+    };
     let _asked = asked(&paths)?;
     let start = Instant::now();
-    while !matches!(paths.presence()?, Presence::Absent) {
+    // where it was killed, the next one may have the name at once, and hears no request that was there before
+    let lasts = |presence| match (presence, running) {
+        (Presence::Absent, _) | (Presence::Starting, Some(_)) => false,
+        (Presence::Running(beacon), Some(asked)) => beacon.session == asked.session,
+        _ => true,
+    };
+    while lasts(paths.presence()?) {
         if start.elapsed() > END_MAX {
             return Err(ProtocolError::Silent {
                 name: name.to_owned(),

@@ -82,8 +82,8 @@ pub enum Fate {
     StopAtChange(Whom, u64, u64),
     /// Another client begins, which asks for the lease for so many milliseconds.
     Rival(u64),
-    /// The same, and the client that has the lease is stopped for as long.
-    Overtake(u64),
+    /// The same, and the client that has the lease is stopped for as long, at once or after so many changes.
+    Overtake(u64, u64),
     /// Another process ends the daemon.
     End,
     /// The same, and the daemon is killed after so many changes of its end.
@@ -246,7 +246,9 @@ const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 16] = [
         Fate::StopAtChange(victim(rng, clients), changes(rng), stop(rng))
     }),
     (12, |rng, _| Fate::Rival(rng.u64(0..8000))),
-    (8, |rng, _| Fate::Overtake(rng.u64(1000..8000))),
+    (8, |rng, _| {
+        Fate::Overtake(rng.u64(0..10), rng.u64(1000..8000))
+    }),
     (15, |rng, clients| Fate::Again(rng.usize(0..clients))),
     (12, |_, _| Fate::Launch),
     (4, |rng, _| Fate::LaunchDoomed(changes(rng))),

@@ -3,7 +3,10 @@
 use super::*;
 use std::path::PathBuf;
 
+use crate::presence::discovery::AttachOptions;
 use crate::presence::paths::{Beacon, running};
+use crate::presence::stop::stop;
+use crate::waiting::hook::keep_waiting;
 
 fn root(test: &str) -> PathBuf {
     std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
@@ -213,5 +216,27 @@ fn a_daemon_that_ends_after_a_logout_leaves_the_next_one_its_lock_file() {
         fs::remove_dir_all(&root).unwrap();
         fs::create_dir(&root).unwrap();
     }
+    fs::remove_dir(&root).unwrap();
+}
+
+#[test]
+fn who_stops_a_daemon_does_not_wait_for_the_next_one_of_its_name() {
+    let root = root("stop");
+    let paths = DaemonPaths::new(Some(&root), "stop").unwrap();
+    let mut held = DaemonLock::take(&paths).unwrap();
+    held.announce(7, 1).unwrap();
+    let options = AttachOptions {
+        root: Some(root.clone()),
+        ..AttachOptions::default()
+    };
+    std::thread::scope(|scope| {
+        let stops = scope.spawn(|| stop("stop", &options, &mut keep_waiting()));
+        while !paths.is_asked_to_stop() {
+            std::thread::yield_now();
+        }
+        held.announce(8, 1).unwrap();
+        stops.join().unwrap().unwrap();
+    });
+    drop(held);
     fs::remove_dir(&root).unwrap();
 }
