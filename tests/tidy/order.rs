@@ -277,7 +277,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     ),
     (
         "sim-daemon/protocol/src/lease",
-        &["device_memory", "heartbeat", "controller"],
+        &["device_memory", "heartbeat", "answer", "controller"],
     ),
     ("sim-daemon/system/src", &["portable", "unix", "system"]),
     (

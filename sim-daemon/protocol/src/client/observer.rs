@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::doors::sync::Arc;
 use crate::doors::time::Instant;
-use crate::lease::controller::check_table;
+use crate::lease::answer::check_table;
 use crate::memory::frame::{Alive, FrameSample};
 use crate::memory::guard::guarded;
 use crate::memory::loaned;

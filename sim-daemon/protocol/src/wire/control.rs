@@ -61,7 +61,7 @@ pub enum Response {
     Controller {
         /// Process in control, if any.
         pid: Option<u32>,
-        /// Its lease; 0 without one.
+        /// Its lease; 0 without one, or from an earlier daemon.
         #[serde(default)]
         epoch: u64,
     },
