@@ -189,10 +189,12 @@ impl Remains {
         };
         // as `DaemonLock::withdraw`
         let _ = file.set_len(0);
+        // after a logout, the next daemon may have the name as soon as the mark is gone
+        let is_named = files::is_at(&file, &self.paths.lock_path()).unwrap_or(true);
         // other threads of ours may be making files
         for _ in 0..REMOVALS {
             remove_shared_files(&self.paths, None);
-            if !exists(&self.paths.shared_folder()) {
+            if !is_named || !exists(&self.paths.shared_folder()) {
                 break;
             }
         }

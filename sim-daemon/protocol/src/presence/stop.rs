@@ -42,7 +42,11 @@ pub fn stop(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<(), P
     // one that starts has no version yet
     let running = match paths.presence()? {
         Presence::Starting => None,
-        _ => Some(find(name, options, &mut *hook)?),
+        _ => {
+            find(name, options, &mut *hook)?;
+            // of a group's daemon, whose run has another number
+            Some(find(paths.name(), options, &mut *hook)?)
+        }
     };
     let _asked = asked(&paths)?;
     let start = Instant::now();
