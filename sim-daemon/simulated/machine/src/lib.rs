@@ -23,5 +23,5 @@ pub mod time;
 pub use shuttle::thread_local;
 
 pub use iceoryx2::overwritten;
-pub use run::{Outcome, Run, at, calm, lost};
+pub use run::{Outcome, Run, at, calm};
 pub use world::{note, random, step};

@@ -310,6 +310,11 @@ pub fn halts() -> Vec<(u64, u64, u32)> {
     with(|world| world.halts.clone())
 }
 
+/// When threads had lost their core: begin and end [ns], and their process.
+pub fn losses() -> Vec<(u64, u64, u32)> {
+    with(|world| world.losses.clone())
+}
+
 /// Since when the process of this number has been dead [ns].
 pub fn dead_since(pid: u32) -> Option<u64> {
     since(pid, State::Dead)

@@ -122,14 +122,6 @@ pub fn calm() {
     });
 }
 
-/// Time between these two in which threads had lost their cores, of all threads together [ns].
-pub fn lost(begin: u64, end: u64) -> u64 {
-    with(|world| {
-        let lost = |&(from, to): &(u64, u64)| to.min(end).saturating_sub(from.max(begin));
-        world.losses.iter().map(lost).sum()
-    })
-}
-
 /// Does something after a time, in the process of the caller.
 pub fn at(after: Duration, call: impl FnOnce() + Send + 'static) {
     thread::begin(Handle::this(), move || {

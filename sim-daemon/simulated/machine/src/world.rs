@@ -45,8 +45,8 @@ pub(crate) struct World {
     pub(crate) preempting: u32,
     /// How long at most, as a power of two [µs].
     pub(crate) longest: u32,
-    /// When threads had lost their core for longer than a millisecond: begin and end [ns].
-    pub(crate) losses: Vec<(u64, u64)>,
+    /// When threads had lost their core for longer than a millisecond: begin and end [ns], and their process.
+    pub(crate) losses: Vec<(u64, u64, u32)>,
     /// When processes were stopped at a change: begin and end [ns], and their number.
     pub(crate) halts: Vec<(u64, u64, u32)>,
     /// How far the clock of the calendar is ahead of the monotonic one [ns].
@@ -220,7 +220,7 @@ impl World {
         let time = 1000 << self.rng.u32(0..self.longest);
         let until = self.now + self.rng.u64(time..2 * time);
         if time >= LOSS_MIN {
-            self.losses.push((self.now, until));
+            self.losses.push((self.now, until, self.process()));
         }
         self.task(me()).wake = until;
         true

@@ -204,8 +204,13 @@ impl Plan {
     }
 }
 
+/// How an act is drawn.
+type Draw = fn(&mut Rng) -> Act;
+/// The same of a fate, with the number of clients.
+type DrawFate = fn(&mut Rng, usize) -> Fate;
+
 /// What clients do, with its weight.
-const ACTS: [(u32, fn(&mut Rng) -> Act); 24] = [
+const ACTS: [(u32, Draw); 24] = [
     (30, |rng| Act::Steps(rng.u8(1..12))),
     (6, |rng| Act::SendRecv(rng.u64(0..30))),
     (6, |rng| Act::Hold(rng.u64(0..100))),
@@ -233,7 +238,7 @@ const ACTS: [(u32, fn(&mut Rng) -> Act); 24] = [
 ];
 
 /// What befalls processes, with its weight.
-const FATES: [(u32, fn(&mut Rng, usize) -> Fate); 16] = [
+const FATES: [(u32, DrawFate); 16] = [
     (35, |rng, clients| Fate::Kill(whom(rng, clients))),
     (20, |rng, clients| {
         Fate::KillAtDoor(victim(rng, clients), doors(rng))

@@ -47,6 +47,7 @@ fn run(seed: u64) -> Run {
         failing: 0,
         dropping: 0,
         preempting: 0,
+        longest: 14,
         lateness: 1_000_000,
         steps_max: 300_000,
         trace: true,

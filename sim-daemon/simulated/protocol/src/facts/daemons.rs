@@ -14,6 +14,13 @@ pub(super) struct Launched {
     at: u64,
 }
 
+impl Launched {
+    /// Whether that is its process.
+    pub(super) fn has_daemon(&self, pid: u32) -> bool {
+        self.daemon.pid == pid
+    }
+}
+
 impl Facts {
     /// Notes a daemon, its owner, and when it began [ns].
     pub fn launched(&self, owner: Handle, daemon: Handle, at: u64) {

@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use sim_machine::fs;
-use sim_machine::lost;
 use sim_machine::process;
 use sim_machine::process::Handle;
 use sim_machine::time::now;
@@ -243,7 +242,11 @@ impl Facts {
                 false => 0,
             };
             let stopped: u64 = known.stops().iter().map(time).sum();
-            let is_loaded = lost(now.saturating_sub(SILENT).max(before), now) >= MISSED;
+            let mut losses = process::losses();
+            let is_daemon = |pid: u32| known.launched.iter().any(|run| run.has_daemon(pid));
+            losses.retain(|loss| loss.2 == client.0 || is_daemon(loss.2));
+            let lately = now.saturating_sub(SILENT).max(before);
+            let is_loaded = in_all(&losses, lately) >= MISSED;
             assert!(
                 stopped >= MISSED || is_loaded,
                 "{client:?} lost its lease, and was there"
@@ -319,11 +322,9 @@ impl Facts {
 
     /// Time since then in which somebody was stopped, or had lost the core [ns].
     pub fn stopped_since(&self, since: u64) -> u64 {
-        let now = now();
-        let overlap =
-            |&(begin, end, _): &(u64, u64, u32)| end.min(now).saturating_sub(begin.max(since));
-        let stopped: u64 = self.known(|known| known.stops().iter().map(overlap).sum());
-        stopped + lost(since, now)
+        let mut times = self.known(|known| known.stops());
+        times.extend(process::losses());
+        in_all(&times, since)
     }
 
     /// This daemon serves from now on; with its files before anybody came.
@@ -347,6 +348,23 @@ impl Facts {
     pub fn first_files(&self) -> BTreeMap<String, usize> {
         self.known(|known| known.files.clone())
     }
+}
+
+/// How long these times are together, from then on and until now; what is in several counts once [ns].
+fn in_all(times: &[(u64, u64, u32)], since: u64) -> u64 {
+    let now = now();
+    let mut clipped: Vec<(u64, u64)> = times
+        .iter()
+        .map(|&(begin, end, _)| (begin.max(since), end.min(now)))
+        .filter(|(begin, end)| begin < end)
+        .collect();
+    clipped.sort_unstable();
+    let (mut total, mut reached) = (0, 0);
+    for (begin, end) in clipped {
+        total += end.saturating_sub(begin.max(reached));
+        reached = reached.max(end);
+    }
+    total
 }
 
 impl Known {
