@@ -23,6 +23,9 @@ from tightloop.planning.ik_objectives import Posture, Reach, rows, unit_quaterni
 from tightloop.planning.ik_of_daemon import IkOfDaemon
 from tightloop.scene.scene import Scene
 
+# As of a daemon: a system that gives no more threads would end the process.
+_THREADS_MAX = 1024
+
 Array = NDArray[np.float64]
 Targets = ArrayLike | Mapping[str, ArrayLike] | None
 
@@ -160,7 +163,7 @@ class IkSolver:
             seed: Seed of the restarts.
             precision: Precision of the iterations, ``"f32"`` or ``"f64"``. Errors are always evaluated in double
                 precision.
-            threads: Number of threads; all cores of this process if left out.
+            threads: Number of threads, at most 1024; all cores of this process if left out.
 
         Returns:
             The solutions.
@@ -309,5 +312,5 @@ def _is_double(value: Any) -> bool:
 
 def _threads(value: Any, own: int | None) -> int:
     if value is None:
-        return system.usable_cores() if own is None else own
+        return min(system.usable_cores(), _THREADS_MAX) if own is None else own
     return checks.integer("solve: threads", value, error=ArgumentError)

@@ -237,7 +237,7 @@ fn broken_gltf_is_refused() {
         ),
         (
             headed(11, &whole[12..]),
-            "its header gives it 11 bytes, and has 12 itself; export".to_owned(),
+            "its header declares 11 bytes, fewer than its own 12; export".to_owned(),
         ),
         (
             headed(12, &[]),

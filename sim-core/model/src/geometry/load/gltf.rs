@@ -83,7 +83,7 @@ fn check_lengths(bytes: &[u8]) -> Result<(), String> {
     }
     if declared < HEAD {
         return Err(format!(
-            "its header gives it {declared} bytes, and has {HEAD} itself; export it again"
+            "its header declares {declared} bytes, fewer than its own {HEAD}; export it again"
         ));
     }
     if number(4) != Some(2) {
