@@ -98,8 +98,10 @@ pub enum Fate {
     LaunchDoomed(u64),
     /// Somebody sends the daemon a signal.
     Signal,
-    /// The folder of daemons is removed, as those of users are who log out.
-    Logout,
+    /// The folder of daemons is removed, as those of users are who log out; another daemon begins then, or not.
+    Logout(bool),
+    /// Another process ends the daemon, and so many microseconds later the next one begins.
+    Replace(u64),
     /// The calendar jumps by so many seconds.
     Jump(i64),
     /// Shared memory has so much left, in kibibytes, for so many milliseconds.
@@ -238,7 +240,7 @@ const ACTS: [(u32, Draw); 24] = [
 ];
 
 /// What befalls processes, with its weight.
-const FATES: [(u32, DrawFate); 16] = [
+const FATES: [(u32, DrawFate); 17] = [
     (35, |rng, clients| Fate::Kill(whom(rng, clients))),
     (20, |rng, clients| {
         Fate::KillAtDoor(victim(rng, clients), doors(rng))
@@ -264,7 +266,8 @@ const FATES: [(u32, DrawFate); 16] = [
     }),
     (5, |_, _| Fate::End),
     (4, |rng, _| Fate::EndDoomed(changes(rng))),
-    (2, |_, _| Fate::Logout),
+    (3, |rng, _| Fate::Logout(rng.bool())),
+    (5, |rng, _| Fate::Replace(rng.u64(0..8000))),
 ];
 
 /// How long processes are stopped [ms].

@@ -208,9 +208,17 @@ impl Cast<'_> {
             }
             Fate::Launch => self.launch(u64::MAX),
             Fate::LaunchDoomed(changes) => self.launch(changes),
-            Fate::Logout => {
+            Fate::Logout(launches) => {
                 self.facts.log_out();
                 let _ = fs::remove_dir_all(root());
+                if launches {
+                    self.launch(u64::MAX);
+                }
+            }
+            Fate::Replace(after) => {
+                self.end_daemon();
+                sleep(Duration::from_micros(after));
+                self.launch(u64::MAX);
             }
             Fate::Signal => {
                 let daemon = self.facts.daemon().filter(|daemon| daemon.is_alive());
