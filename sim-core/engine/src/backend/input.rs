@@ -174,11 +174,11 @@ mod tests {
     fn the_first_value_that_is_not_finite_is_found_wherever_it_is() {
         for bad in [0, 63, 64, 65, 127, 128, 199] {
             for first in [0, 1, 64] {
-                let mut singles = vec![1.0_f32; 264];
-                let mut doubles = vec![1.0_f64; 264];
+                let mut singles = vec![1.0_f32; 265];
+                let mut doubles = vec![1.0_f64; 265];
                 (singles[first + bad], doubles[first + bad]) = (f32::NAN, 1e300);
                 // one behind it does not matter
-                (singles[263], doubles[263]) = (f32::INFINITY, f64::NAN);
+                (singles[264], doubles[264]) = (f32::INFINITY, f64::NAN);
                 let part = first..first + 200;
                 let expected = Some(first + bad);
                 let of_singles = Values::F32(&singles);
