@@ -71,3 +71,66 @@ pub fn stop(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<(), P
     }
     Ok(())
 }
+
+#[cfg(all(test, not(simulated)))]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::doors::fs;
+    use crate::presence::daemon_lock::DaemonLock;
+    use crate::waiting::hook::keep_waiting;
+
+    fn root(test: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()))
+    }
+
+    #[test]
+    fn who_stops_a_daemon_does_not_wait_for_the_next_one_of_its_name() {
+        let root = root("stop");
+        let paths = DaemonPaths::new(Some(&root), "stop").unwrap();
+        let mut held = DaemonLock::take(&paths).unwrap();
+        held.announce(7, 1).unwrap();
+        let options = AttachOptions {
+            root: Some(root.clone()),
+            ..AttachOptions::default()
+        };
+        std::thread::scope(|scope| {
+            let stops = scope.spawn(|| stop("stop", &options, &mut keep_waiting()));
+            while !paths.is_asked_to_stop() && !stops.is_finished() {
+                std::thread::yield_now();
+            }
+            held.announce(8, 1).unwrap();
+            stops.join().unwrap().unwrap();
+        });
+        drop(held);
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
+    fn who_stops_a_group_waits_for_its_daemon() {
+        let root = root("group");
+        let paths = DaemonPaths::new(Some(&root), "many").unwrap();
+        let mut held = DaemonLock::take(&paths).unwrap();
+        let mut group = DaemonLock::take(&paths.group(1).unwrap()).unwrap();
+        group.announce(9, 1).unwrap();
+        held.announce(7, 2).unwrap();
+        let options = AttachOptions {
+            root: Some(root.clone()),
+            ..AttachOptions::default()
+        };
+        std::thread::scope(|scope| {
+            let stops = scope.spawn(|| stop("many.1", &options, &mut keep_waiting()));
+            while !paths.is_asked_to_stop() && !stops.is_finished() {
+                std::thread::yield_now();
+            }
+            // it looks every 2 ms
+            std::thread::sleep(Duration::from_millis(50));
+            assert!(!stops.is_finished(), "the daemon is still there");
+            drop(group);
+            drop(held);
+            stops.join().unwrap().unwrap();
+        });
+        fs::remove_dir(&root).unwrap();
+    }
+}
