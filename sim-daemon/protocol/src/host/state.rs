@@ -124,8 +124,8 @@ impl State {
                 Ok(Request::Describe) => Response::Described,
                 Ok(Request::Controller) => {
                     let pid = self.lease.as_mut().and_then(Lease::present_holder);
-                    let epoch =
-                        pid.map_or(0, |_| self.lease.as_ref().map_or(0, |lease| lease.epoch));
+                    let lease = self.lease.as_ref().filter(|_| pid.is_some());
+                    let epoch = lease.map(|lease| lease.epoch);
                     Response::Controller { pid, epoch }
                 }
                 // a release that waits unread came before: the requests of several clients come in no order

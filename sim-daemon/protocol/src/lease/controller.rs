@@ -370,9 +370,9 @@ fn open_lease(
     let controller = Controller::new(connection, description, frames, epoch, ports?);
     // the daemon has seen the ports now, unless it took the lease back while they were opened
     match connection.holder(hook)? {
-        Some((_, present)) if present == epoch => Ok(controller),
+        Some((_, Some(present))) if present == epoch => Ok(controller),
         // an earlier daemon tells of the process alone
-        Some((pid, 0)) if pid == crate::doors::process::id() => Ok(controller),
+        Some((pid, None)) if pid == crate::doors::process::id() => Ok(controller),
         _ => Err(connection.peer.lease_lost()),
     }
 }

@@ -222,8 +222,11 @@ impl Connection {
         Ok(())
     }
 
-    /// The process that holds the lease, if any, and which lease.
-    pub(crate) fn holder(&self, hook: Hook<'_>) -> Result<Option<(u32, u64)>, ProtocolError> {
+    /// The process that holds the lease, if any, and which lease if the daemon tells it.
+    pub(crate) fn holder(
+        &self,
+        hook: Hook<'_>,
+    ) -> Result<Option<(u32, Option<u64>)>, ProtocolError> {
         match self.ask(&Request::Controller, hook)? {
             Response::Controller { pid, epoch } => Ok(pid.map(|pid| (pid, epoch))),
             _ => Err(malformed("the answer to controller")),

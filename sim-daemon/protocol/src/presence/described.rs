@@ -64,7 +64,7 @@ pub(crate) enum Damage {
     Lease(u64),
 }
 
-/// The file whose presence says so. Its name takes longer to make than to look for.
+/// The file whose presence is that mark. Its name takes longer to make than to look for.
 pub(crate) fn mark(paths: &DaemonPaths, session: u64, damage: Damage) -> PathBuf {
     let name = match damage {
         Damage::Daemon => format!("{session:016x}.damaged"),

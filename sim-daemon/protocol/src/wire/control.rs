@@ -61,9 +61,8 @@ pub enum Response {
     Controller {
         /// Process in control, if any.
         pid: Option<u32>,
-        /// Its lease; 0 without one, or from an earlier daemon.
-        #[serde(default)]
-        epoch: u64,
+        /// Its lease; earlier daemons do not tell it.
+        epoch: Option<u64>,
     },
     /// Control is yours, through the services of this epoch.
     Granted {

@@ -49,7 +49,7 @@ impl Facts {
         self.known(|known| known.last_launched().map(|launched| launched.owner))
     }
 
-    /// The daemon that serves whoever comes, and that nobody asked to end.
+    /// The daemon that new clients find, and that nobody asked to end.
     pub fn server(&self) -> Option<Handle> {
         self.known(|known| {
             let mut runs = known.serving.iter();
