@@ -81,7 +81,7 @@ impl World {
         })
     }
 
-    /// Counts changes of the calling process; it is killed at the door behind the last one.
+    /// Counts changes of the calling process. Behind the last one it is stopped, or killed at the next door.
     pub(crate) fn count_changes(&mut self, changes: u64) {
         if changes == 0 {
             return;

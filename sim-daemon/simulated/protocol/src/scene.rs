@@ -192,12 +192,11 @@ impl Cast<'_> {
                 self.end_daemon();
             }
             Fate::Stop(whom, time) => self.stop(whom, time),
-            Fate::Overtake(0, time) => {
-                self.stop(Whom::Holder, time);
-                self.befall(Fate::Rival(time));
-            }
             Fate::Overtake(changes, time) => {
-                self.befall(Fate::StopAtChange(Whom::Holder, changes, time));
+                match changes {
+                    0 => self.stop(Whom::Holder, time),
+                    _ => self.befall(Fate::StopAtChange(Whom::Holder, changes, time)),
+                }
                 self.befall(Fate::Rival(time));
             }
             Fate::Again(number) => {

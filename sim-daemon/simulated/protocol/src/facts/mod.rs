@@ -237,11 +237,9 @@ impl Facts {
         self.known(|known| {
             let now = now();
             let before = known.lost.insert(client, now).unwrap_or(0);
-            let time = |&(begin, end, pid): &(u64, u64, u32)| match pid == client.0 {
-                true => end.min(now).saturating_sub(begin.max(before)),
-                false => 0,
-            };
-            let stopped: u64 = known.stops().iter().map(time).sum();
+            let mut stops = known.stops();
+            stops.retain(|stop| stop.2 == client.0);
+            let stopped = in_all(&stops, before);
             let mut losses = process::losses();
             let is_daemon = |pid: u32| known.launched.iter().any(|run| run.has_daemon(pid));
             losses.retain(|loss| loss.2 == client.0 || is_daemon(loss.2));
