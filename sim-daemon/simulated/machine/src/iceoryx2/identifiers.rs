@@ -25,6 +25,8 @@ macro_rules! ids {
 ids! {
     /// Of a node.
     UniqueNodeId,
+    /// Of a service.
+    UniqueServiceId,
     /// Of a publisher.
     UniquePublisherId,
     /// Of a subscriber.

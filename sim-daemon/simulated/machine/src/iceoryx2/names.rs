@@ -71,6 +71,10 @@ impl Names {
         self.services.join(format!("{}{hash}.service", self.prefix))
     }
 
+    pub(crate) fn services(&self) -> &Path {
+        &self.services
+    }
+
     pub(crate) fn nodes(&self) -> &Path {
         &self.nodes
     }

@@ -229,7 +229,7 @@ impl World {
     }
 
     /// The service whose settings are there; nothing while they cannot be read.
-    fn look(&self, path: &std::path::Path) -> Result<Option<(u128, Settings)>, Failure> {
+    pub(crate) fn look(&self, path: &std::path::Path) -> Result<Option<(u128, Settings)>, Failure> {
         let id = self.wires.settings.get(path);
         let Some(id) = id.filter(|_| self.files.exists(path)) else {
             return Err(Failure::DoesNotExist);
