@@ -320,10 +320,13 @@ def test_what_nobody_sees_is_not_shown_and_a_page_that_comes_later_shows_what_is
     with tl.launch(box, worlds=2, name=unique()) as sim:
         viewer = sim.view(port=8290)
         first = look(viewer.url)
+        sim.step()
+        # a page that has just connected shows text before the viewer observes again
+        first.wait(lambda: "step 1" in first.text, "the viewer observes")
         observing = mapped()
         first.page.close()
         assert wait_until(lambda: mapped() < observing, 10), "the viewer looks away"
-        for _ in range(25):
+        for _ in range(24):
             sim.step()
         second = look(viewer.url)
         second.wait(lambda: "step 25" in second.text, "the present step is shown")
