@@ -140,7 +140,7 @@ impl Inbox {
         });
         let here = here.iter().map(|(row, values)| Command {
             field: &row.name,
-            columns: row.start..row.start + values.len() / worlds,
+            columns: row.start..row.start.saturating_add(values.len() / worlds),
             values: Values::F32(values),
         });
         let commands: Vec<Command<'_>> = here.chain(there).collect();
