@@ -57,6 +57,7 @@ impl State {
         // the old slots go first: there may not be room for both
         let old = self.lease.take();
         self.pacer.rest();
+        self.affinity.stay();
         if let Some(mut old) = old {
             let memory = std::mem::take(&mut old.memory);
             guarded(|| drop(old));

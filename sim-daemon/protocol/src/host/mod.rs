@@ -205,10 +205,20 @@ impl Host {
         }
         let next = self.waiter.wait(&self.listener, &mut self.state)?;
         if next == Next::Command {
-            let (client_core, affinity) =
-                (self.state.inbox.header().core, &mut self.state.affinity);
-            let shared = affinity.core() == client_core;
-            self.waiter.share(shared && !affinity.leave(client_core));
+            let client_core = self.state.inbox.header().core;
+            let is_step = self.state.inbox.op() == Op::Step;
+            let (is_paced, affinity) = (self.state.pacer.is_paced(), &mut self.state.affinity);
+            let shared = affinity.core(is_paced) == client_core;
+            let moved = match (is_paced, is_step) {
+                (false, _) => shared && affinity.leave(client_core),
+                (true, true) => shared && affinity.keep_off(client_core),
+                // other calls may start threads, which would stay away, too
+                (true, false) => {
+                    affinity.stay();
+                    false
+                }
+            };
+            self.waiter.share(shared && !moved);
         }
         Ok(next)
     }

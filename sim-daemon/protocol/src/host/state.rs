@@ -210,7 +210,7 @@ impl State {
             epoch: lease.epoch,
             ack_seq: self.inbox.header().seq,
             busy_ns,
-            core: self.affinity.core(),
+            core: self.affinity.core(self.pacer.is_paced()),
             slot: on_device.map_or(0, |(slot, _)| 1 + slot as u64),
             done: on_device.map_or(0, |(_, done)| done),
             due_next: self.pacer.due_next(),
@@ -284,7 +284,7 @@ impl State {
             epoch: lease.epoch,
             ack_seq: self.inbox.header().seq,
             outcome: kind as u32,
-            core: self.affinity.core(),
+            core: self.affinity.core(self.pacer.is_paced()),
             ..header(&self.description, &table, self.frames)
         };
         if !matches!(guarded(|| loaned::send(loan)), Some(Ok(_))) {

@@ -261,7 +261,7 @@ impl Controller {
             seq: self.seq,
             op: call.op as u32,
             rows: call.rows() as u32,
-            core: self.affinity.core(),
+            core: self.affinity.core(self.due != 0),
         };
         call.write(&self.description, loaned::words(loan.payload_mut()));
         let sent = guarded(|| loaned::send(loan)).ok_or_else(damaged)?;
@@ -293,7 +293,7 @@ impl Controller {
         self.flight = Flight::Landed;
         let head = loaned::head(&sample).ok_or_else(|| damaged(peer, "read a frame"))?;
         self.due = head.due_next;
-        let shared = head.core == self.affinity.core();
+        let shared = head.core == self.affinity.core(self.due != 0);
         self.waiters
             .iter_mut()
             .for_each(|waiter| waiter.share(shared));

@@ -2,7 +2,7 @@
 //!
 //! Waking the other side through a socket makes the system expect that the waker sleeps next, so it may put both on one core,
 //! and leaves them there. Each side therefore says where it runs; when that is the same core, nobody spins, and the daemon
-//! moves away once in a while.
+//! moves away once in a while. A daemon with a pace stays away: late frames cost more than a core that it does not use.
 
 use std::time::Duration;
 
@@ -25,6 +25,7 @@ pub(crate) struct CoreAffinity {
     asked: u32,
     moved: Instant,
     pause: Duration,
+    away: Option<cores::Away>,
 }
 
 impl CoreAffinity {
@@ -34,13 +35,14 @@ impl CoreAffinity {
             asked: 0,
             moved: Instant::now(),
             pause: PAUSE_MIN,
+            away: None,
         }
     }
 
-    /// The core we run on, or ran on a few commands ago.
-    pub(crate) fn core(&mut self) -> u64 {
+    /// The core we run on, or ran on a few commands ago. With a pace there is time to ask at every command.
+    pub(crate) fn core(&mut self, is_paced: bool) -> u64 {
         self.asked += 1;
-        if self.asked == ASK_PERIOD {
+        if is_paced || self.asked >= ASK_PERIOD {
             (self.asked, self.core) = (0, core_or_unknown());
         }
         self.core
@@ -63,6 +65,23 @@ impl CoreAffinity {
         self.core = core_or_unknown();
         moved
     }
+
+    /// Keeps this thread off `core` if it is there, until [`CoreAffinity::stay`] or a call for another core. Returns whether
+    /// it is elsewhere now.
+    pub(crate) fn keep_off(&mut self, core: u64) -> bool {
+        // the core of before may be the only other one
+        self.away = None;
+        if core < UNKNOWN {
+            self.away = cores::keep_off(core as usize);
+        }
+        self.core = core_or_unknown();
+        self.core != core
+    }
+
+    /// Ends [`CoreAffinity::keep_off`].
+    pub(crate) fn stay(&mut self) {
+        self.away = None;
+    }
 }
 
 fn core_or_unknown() -> u64 {
@@ -81,7 +100,7 @@ mod tests {
         let mut affinity = CoreAffinity::new();
         std::thread::sleep(PAUSE_MIN);
         if cores::current().is_none() {
-            assert!(affinity.core() > UNKNOWN && !affinity.leave(affinity.core));
+            assert!(affinity.core(true) > UNKNOWN && !affinity.leave(affinity.core));
             return;
         }
         assert!(!affinity.leave(UNKNOWN));
@@ -95,5 +114,27 @@ mod tests {
             !(first && again) || left.elapsed() >= PAUSE_MIN,
             "twice in a row"
         );
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_side_that_keeps_off_a_core_stays_off_until_it_need_not() {
+        use std::thread::available_parallelism;
+
+        let allowed = available_parallelism().unwrap();
+        let mut affinity = CoreAffinity::new();
+        // from one core to the next, and back where there are two
+        for _ in 0..3 {
+            let core = core_or_unknown();
+            assert_eq!(affinity.keep_off(core), core_or_unknown() != core);
+            // the system may have moved us before the call, which has nothing to do then
+            if affinity.away.is_some() {
+                std::thread::sleep(Duration::from_millis(2));
+                assert_ne!(core_or_unknown(), core);
+                assert!(available_parallelism().unwrap() < allowed);
+            }
+        }
+        affinity.stay();
+        assert_eq!(available_parallelism().unwrap(), allowed);
     }
 }

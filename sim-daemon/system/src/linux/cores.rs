@@ -10,17 +10,39 @@ pub fn current() -> Option<usize> {
 /// Moves this thread off `core` if it is there and may run elsewhere, and says whether it moved. It may come back at once if
 /// the system thinks so; where it may run stays the user's choice.
 pub fn leave(core: usize) -> bool {
-    let Ok(allowed) = sched_getaffinity(None) else {
-        return false;
-    };
+    keep_off(core).is_some_and(|away| {
+        drop(away);
+        sched_getcpu() != core
+    })
+}
+
+/// Moves this thread, and those that it starts, off `core` if it is there and may run elsewhere, until the value is dropped,
+/// on the same thread. None where it did not.
+pub fn keep_off(core: usize) -> Option<Away> {
+    let allowed = sched_getaffinity(None).ok()?;
     let mut others = allowed;
     others.unset(core);
-    if sched_getcpu() != core || others.count() == 0 || sched_setaffinity(None, &others).is_err() {
-        return false;
+    if sched_getcpu() != core || others.count() == 0 {
+        return None;
     }
-    // that failed only if it was changed meanwhile
-    let _ = sched_setaffinity(None, &allowed);
-    sched_getcpu() != core
+    sched_setaffinity(None, &others).ok()?;
+    Some(Away { allowed, others })
+}
+
+/// A core that a thread keeps off.
+#[derive(Debug)]
+pub struct Away {
+    allowed: CpuSet,
+    others: CpuSet,
+}
+
+impl Drop for Away {
+    fn drop(&mut self) {
+        // another choice that was made meanwhile stays
+        if sched_getaffinity(None).is_ok_and(|now| now == self.others) {
+            let _ = sched_setaffinity(None, &self.allowed);
+        }
+    }
 }
 
 /// Keeps this thread, and those that it starts, on some cores.
@@ -56,6 +78,13 @@ mod tests {
         // the system may move us between the two lines: then there is nothing to leave
         assert!(leave(core) || sched_getcpu() != core);
         assert_eq!(sched_getaffinity(None).unwrap(), allowed);
+        let core = sched_getcpu();
+        if let Some(away) = keep_off(core) {
+            std::thread::yield_now();
+            assert_ne!(sched_getcpu(), core);
+            drop(away);
+            assert_eq!(sched_getaffinity(None).unwrap(), allowed);
+        }
         assert!(!leave(CpuSet::MAX_CPU - 1), "it is not there");
     }
 }

@@ -10,6 +10,17 @@ pub fn leave(_core: usize) -> bool {
     false
 }
 
+/// Moves this thread off `core` until the value is dropped. None where it did not.
+pub fn keep_off(_core: usize) -> Option<Away> {
+    None
+}
+
+/// A core that a thread keeps off.
+#[derive(Debug)]
+pub struct Away {
+    _never: std::convert::Infallible,
+}
+
 /// Keeps this thread, and those that it starts, on some cores.
 ///
 /// # Errors

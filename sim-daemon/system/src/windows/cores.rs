@@ -16,26 +16,49 @@ pub fn current() -> Option<usize> {
 /// Moves this thread off `core` if it is there and may run elsewhere, and says whether it moved. It may come back at once if
 /// the system thinks so; where it may run stays the user's choice.
 pub fn leave(core: usize) -> bool {
+    keep_off(core).is_some_and(|away| {
+        drop(away);
+        current() != Some(core)
+    })
+}
+
+/// Moves this thread off `core` if it is there and may run elsewhere, until the value is dropped, on the same thread. None
+/// where it did not.
+pub fn keep_off(core: usize) -> Option<Away> {
     let (mut allowed, mut all) = (0, 0);
-    // SAFETY: both places are ours; the handles of this process and thread need no closing.
+    // SAFETY: both places are ours; the handle of this process needs no closing.
     let others = unsafe {
         if GetProcessAffinityMask(GetCurrentProcess(), &raw mut allowed, &raw mut all) == 0 {
-            return false;
+            return None;
         }
         allowed & !mask(core)
     };
     if current() != Some(core) || others == 0 {
-        return false;
+        return None;
     }
-    // SAFETY: as above.
-    unsafe {
-        let before = SetThreadAffinityMask(GetCurrentThread(), others);
-        if before == 0 {
-            return false;
+    // SAFETY: the handle of this thread needs no closing.
+    let before = unsafe { SetThreadAffinityMask(GetCurrentThread(), others) };
+    (before != 0).then_some(Away { before, others })
+}
+
+/// A core that a thread keeps off.
+#[derive(Debug)]
+pub struct Away {
+    before: usize,
+    others: usize,
+}
+
+impl Drop for Away {
+    fn drop(&mut self) {
+        // SAFETY: the handle of this thread needs no closing.
+        unsafe {
+            let meanwhile = SetThreadAffinityMask(GetCurrentThread(), self.before);
+            // another choice that was made meanwhile stays
+            if meanwhile != self.others && meanwhile != 0 {
+                SetThreadAffinityMask(GetCurrentThread(), meanwhile);
+            }
         }
-        SetThreadAffinityMask(GetCurrentThread(), before);
     }
-    current() != Some(core)
 }
 
 /// Keeps this process on some cores.

@@ -94,6 +94,15 @@ pub mod cores {
         })
     }
 
+    /// The same. The system may move the thread back, as it may after [`leave`].
+    pub fn keep_off(core: usize) -> Option<Away> {
+        leave(core).then_some(Away)
+    }
+
+    /// A core that a thread keeps off.
+    #[derive(Debug)]
+    pub struct Away;
+
     fn core(world: &mut World) -> usize {
         let there = world.system.cores.get(&me()).copied();
         match there {
