@@ -72,22 +72,19 @@ fn all_weights_beside_a_file_share_one_budget() {
     let reason = read("data", 0, 16).unwrap_err();
     assert!(reason.contains("have more than 40 bytes"), "{reason}");
     assert_eq!(read("data", 0, 8).unwrap().len(), 8);
-    // one tensor of 2³⁰ numbers is refused before it is read
+    // one tensor of 2³⁰ or of 2⁶³ numbers is refused before it is read
     let location = [field(1, b"location"), field(2, b"data")].concat();
-    let huge = [
-        number(1, 1 << 15),
-        number(1, 1 << 15),
-        number(2, 1),
-        field(8, b"w"),
-        number(14, 1),
-        field(13, &location),
-    ];
-    let gemm = node("Gemm", &["obs", "w"], "action", &[]);
-    let reason = refused(&[gemm], &[huge.concat()]);
-    assert!(
-        reason.contains("have more than 1073741824 bytes"),
-        "{reason}"
-    );
+    for axes in [&[1 << 15, 1 << 15][..], &[1 << 24, 1 << 24, 1 << 15]] {
+        let mut huge: Vec<_> = axes.iter().map(|&axis| number(1, axis)).collect();
+        huge.extend([number(2, 1), field(8, b"w"), number(14, 1)]);
+        huge.push(field(13, &location));
+        let gemm = node("Gemm", &["obs", "w"], "action", &[]);
+        let reason = refused(&[gemm], &[huge.concat()]);
+        assert!(
+            reason.contains("have more than 1073741824 bytes"),
+            "{reason}"
+        );
+    }
 }
 
 #[test]

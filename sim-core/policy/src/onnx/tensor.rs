@@ -211,7 +211,7 @@ impl<'a> Parts<'a> {
                 "lies in `{file}`, which is not in the folder of the ONNX file; put it there"
             ));
         }
-        let bytes = count as u64 * bytes_of(self.dtype)?;
+        let bytes = (count as u64).saturating_mul(bytes_of(self.dtype)?);
         match number("length")? {
             Some(length) if length != bytes => Err(format!(
                 "has the shape {shape:?}, which is {bytes} bytes, and {length} in `{file}`; export the policy anew"
