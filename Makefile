@@ -232,7 +232,7 @@ newcomer: wheel ## time a clean checkout with empty caches, a built one, a wheel
 	$(PYTHON) -m benches newcomer_start
 
 bench: wheel $(VENV)/.dev vulkan browser ## speed, beside the simulators it is compared with
-	cargo bench --package tightloop --bench step
+	cargo bench --workspace --bench step
 	cargo bench --package sim-device --bench replay
 	cargo build --release --quiet --workspace --example franka_lesson
 	"$${CARGO_TARGET_DIR:-target}"/release/examples/franka_lesson $(WORLDS) # in process, without daemon and Python

@@ -42,7 +42,7 @@ AHEAD = 50
 
 def program() -> list[str]:
     """The command of benches/daemon/realtime.rs, compiled."""
-    build = ["cargo", "bench", "--quiet", "--package", "tightloop", "--bench", "realtime", "--no-run"]
+    build = ["cargo", "bench", "--quiet", "--workspace", "--bench", "realtime", "--no-run"]
     lines = subprocess.run(
         [*build, "--message-format=json"], cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True
     ).stdout.splitlines()

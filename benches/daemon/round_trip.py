@@ -35,7 +35,7 @@ PARTS = {"p50_us": 50, "p99_us": 99, "p999_us": 99.9}
 
 def in_rust() -> tuple[dict[str, float], dict[str, float]]:
     """Percentiles of a step in Rust, in process and through a daemon [us]."""
-    command = ["cargo", "bench", "--quiet", "--package", "tightloop", "--bench", "round_trip"]
+    command = ["cargo", "bench", "--quiet", "--workspace", "--bench", "round_trip"]
     measured = json.loads(subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True).stdout)
     return measured, measured["wire"]
 

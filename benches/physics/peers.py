@@ -102,7 +102,7 @@ def daemon_rate(sim: tl.Sim, commands: NDArray[np.float32], name: str) -> float:
 
 def step_bench() -> Path:
     """The built bench of steps in process."""
-    command = ["cargo", "bench", "--quiet", "--package", "tightloop", "--bench", "step", "--no-run"]
+    command = ["cargo", "bench", "--quiet", "--workspace", "--bench", "step", "--no-run"]
     command += ["--message-format", "json"]
     lines = subprocess.run(command, cwd=REPOSITORY, stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()
     built = [message.get("executable") for message in map(json.loads, lines)]
