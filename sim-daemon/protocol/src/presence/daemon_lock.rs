@@ -103,10 +103,17 @@ impl DaemonLock {
             return Ok(None);
         }
         // after a logout, a daemon whose lock file is gone holds only its mark
-        let mark = private().open(paths.shared_folder().join(PLACE));
-        if mark.is_ok_and(|mark| !files::try_lock_shared(&mark).is_ok_and(|taken| taken)) {
-            let _ = fs::remove_file(&path);
-            return Ok(None);
+        let mark = paths.shared_folder().join(PLACE);
+        match is_marked(&mark) {
+            Ok(false) => {}
+            Ok(true) => {
+                let _ = fs::remove_file(&path);
+                return Ok(None);
+            }
+            Err(error) => {
+                let _ = fs::remove_file(&path);
+                return Err(ProtocolError::root(&mark, &error));
+            }
         }
         // clients of a dead predecessor see that it is gone as soon as the line is
         file.set_len(0).map_err(root_error)?;
@@ -199,6 +206,14 @@ impl Remains {
             }
         }
         remove_named_files(&self.paths, &file);
+    }
+}
+
+/// Whether a daemon holds the mark at this path. A mark that cannot be opened may have a daemon, too.
+fn is_marked(mark: &Path) -> std::io::Result<bool> {
+    match private().open(mark) {
+        Err(error) if error.kind() == NotFound => Ok(false),
+        opened => Ok(!files::try_lock_shared(&opened?)?),
     }
 }
 
@@ -301,7 +316,8 @@ pub fn cleanup_after_death(root: Option<&Path>, name: &str) -> Result<bool, Prot
 pub fn sweep(root: Option<&Path>) -> Result<(), ProtocolError> {
     for paths in names_with_lock(root)? {
         if matches!(paths.presence(), Ok(Presence::Absent)) {
-            drop(DaemonLock::try_take(&paths)?);
+            // what fails is left to the next sweep
+            drop(DaemonLock::try_take(&paths));
         }
     }
     let Ok(entries) = fs::read_dir(shared_memory()) else {

@@ -50,6 +50,22 @@ fn a_lock_file_that_cannot_be_read_is_an_error_and_no_other_daemon() {
 }
 
 #[test]
+fn a_mark_that_cannot_be_opened_may_be_that_of_a_daemon_that_lives() {
+    let root = root("unopened");
+    let paths = DaemonPaths::new(Some(&root), "unopened").unwrap();
+    private_folder(paths.root()).unwrap();
+    // no system opens a folder to write into it
+    let mark = paths.shared_folder().join(PLACE);
+    fs::create_dir_all(&mark).unwrap();
+    let error = cleanup_after_death(Some(&root), "unopened").unwrap_err();
+    assert!(matches!(&error, ProtocolError::Root { path, .. } if *path == mark));
+    assert!(mark.exists());
+    assert_eq!(fs::read_dir(&root).unwrap().count(), 0);
+    fs::remove_dir_all(paths.shared_folder()).unwrap();
+    fs::remove_dir(&root).unwrap();
+}
+
+#[test]
 fn a_daemon_that_is_ended_at_once_takes_its_files_and_the_request_with_it() {
     let root = root("at-once");
     let paths = DaemonPaths::new(Some(&root), "busy").unwrap();

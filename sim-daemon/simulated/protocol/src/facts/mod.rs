@@ -212,7 +212,11 @@ impl Facts {
                 known.holds.iter().any(may),
                 "process {pid} has given the lease back that keeps {client:?} out"
             );
-            let is_late = |begin: Option<u64>, time| begin.is_some_and(|begin| begin + time < now);
+            // a daemon that does not run does not see who died
+            let stops = known.stops();
+            let is_late = |begin: Option<u64>, time| {
+                begin.is_some_and(|begin| begin + time + in_all(&stops, begin) < now)
+            };
             let dead = process::dead_since(pid);
             assert!(
                 !is_late(dead, if client.1 == 0 { SILENT } else { MISSED }),
@@ -223,7 +227,7 @@ impl Facts {
             let excused =
                 |&(_, end, who): &(u64, u64, u32)| who != pid && end > stopped.unwrap_or(0);
             assert!(
-                stopped.is_none() || known.slow > 0 || known.stops().iter().any(excused),
+                stopped.is_none() || known.slow > 0 || stops.iter().any(excused),
                 "process {pid} is silent and keeps {client:?} out"
             );
         });
@@ -325,7 +329,7 @@ impl Facts {
         in_all(&times, since)
     }
 
-    /// This daemon serves from now on; with its files before anybody came.
+    /// This daemon serves from now on; with the files that are there.
     pub fn serves(&self, session: u64, files: BTreeMap<String, usize>) {
         let (this, now) = (Handle::this(), now());
         self.known(|known| {
