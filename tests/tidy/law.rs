@@ -1,4 +1,4 @@
-//! Which package has which door, and where `unsafe` may stand.
+//! Which package has which door, which knows which others, and where `unsafe` may stand.
 
 /// The doors of each heavy package: one, and that of a simulation.
 pub const DOORS: [(&str, &str); 30] = [
@@ -34,8 +34,100 @@ pub const DOORS: [(&str, &str); 30] = [
     ("tokio", "sim-daemon/src/top/http.rs"),
 ];
 
+/// Sources of a package, and other packages of which they know nothing.
+pub const STRANGERS: &[(&str, &[&str])] = &[
+    (
+        "sim-core/physics/src",
+        &[
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_protocol",
+            "sim_daemon",
+        ],
+    ),
+    (
+        "sim-core/model/src",
+        &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+    ),
+    (
+        "sim-core/compile/src",
+        &[
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_protocol",
+            "sim_daemon",
+        ],
+    ),
+    (
+        "sim-core/device/src",
+        &[
+            "sim_physics",
+            "sim_model",
+            "sim_engine",
+            "sim_protocol",
+            "sim_daemon",
+        ],
+    ),
+    ("sim-core/engine/src", &["sim_protocol", "sim_daemon"]),
+    (
+        "sim-core/ik/src",
+        &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+    ),
+    (
+        "sim-core/policy/src",
+        &["sim_physics", "sim_model", "sim_engine", "sim_daemon"],
+    ),
+    (
+        "sim-core/render/src",
+        &["sim_device", "sim_engine", "sim_protocol", "sim_daemon"],
+    ),
+    (
+        "sim-daemon/protocol/src",
+        &[
+            "sim_physics",
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_daemon",
+        ],
+    ),
+    (
+        "sim-daemon/client-c/src",
+        &[
+            "sim_physics",
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_daemon",
+        ],
+    ),
+    (
+        "sim-daemon/picture/src",
+        &[
+            "sim_physics",
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_protocol",
+            "sim_daemon",
+        ],
+    ),
+    (
+        "py-client/src",
+        &[
+            "sim_physics",
+            "sim_model",
+            "sim_device",
+            "sim_engine",
+            "sim_ik",
+        ],
+    ),
+];
+
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 57] = [
+pub const UNSAFE: [&str; 58] = [
     "py-client/src/frame.rs",                                     // NumPy views
     "py-client/src/xla/abi.rs", // structs and arrays of XLA's foreign functions
     "sim-core/compile/src/lib.rs", // runs machine code
@@ -63,6 +155,7 @@ pub const UNSAFE: [&str; 57] = [
     "sim-core/physics/src/lane/simd/neon.rs", // intrinsics
     "sim-core/physics/src/lane/simd/x86.rs", // intrinsics
     "sim-core/policy/src/kernel.rs",    // instruction sets
+    "sim-core/render/src/image.rs",     // instruction sets
     "sim-daemon/client-c/src/calls.rs", // pointers of C, which pointers.rs checks
     "sim-daemon/client-c/src/client.rs", // as calls.rs
     "sim-daemon/client-c/src/description.rs", // pointers to texts of the same struct

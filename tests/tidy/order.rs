@@ -340,6 +340,13 @@ pub const ORDER: &[(&str, &[&str])] = &[
         "sim-core/policy/src/onnx",
         &["protobuf", "tensor", "message", "layers", "chain"],
     ),
+    (
+        "sim-core/render/src",
+        &[
+            "vector", "camera", "tile", "tree", "solids", "scene", "image",
+        ],
+    ),
+    ("sim-core/render/src/tree", &["build", "cast", "fill"]),
     ("sim-daemon/src/export", &["refusal", "snapshot", "arrays"]),
     (
         "sim-daemon/src/serve",

@@ -1,0 +1,18 @@
+//! Images of cameras in many worlds: rays against the shapes of a model, on the CPU.
+//!
+//! scene (what is seen, per body) → image (tiles, and what each may see) → tree and solids (where rays meet it)
+//!
+//! An image depends on its world alone: its bits are the same for any number of worlds and threads.
+
+mod camera;
+mod image;
+mod scene;
+mod solids;
+mod tile;
+mod tree;
+mod vector;
+
+pub use camera::Camera;
+pub use image::{Draw, Image, Scratch, draw};
+pub use scene::{Look, NOTHING, Part, Scene};
+pub use vector::Frame;

@@ -1,0 +1,275 @@
+//! A tile through a tree.
+//!
+//! All rays of an image begin at one point o. So what a triangle needs of a ray is linear in its direction d, and in the
+//! pixel's place:
+//!
+//! ```text
+//! A = -n·d,  G = n·o - h                       the ray meets the plane at G / A
+//! u A = ((ũ·o + u₀) (-n) + G ũ)·d              as v A: the signs tell whether it is inside
+//! ```
+//!
+//! A tile goes down the tree as a whole, between the four planes through its edges. A few leaves are drawn triangle by
+//! triangle, eight rays at once; where there are more of them than pays, each ray goes down by itself.
+
+use sim_physics::lane::simd::F32x8;
+use sim_physics::lane::{Lane, Num};
+
+use super::cast::{Origin, Stack, products};
+use super::{LEAF, Leaf, Node, Tree};
+use crate::tile::{EDGE, Tile};
+use crate::vector::{Frame, Vector, three};
+
+/// Most leaves that are drawn triangle by triangle.
+const LEAVES_MAX: usize = 64;
+
+/// Memory for what waits on the way down.
+#[derive(Default)]
+pub(crate) struct Waiting {
+    stack: Stack,
+    /// Leaves with their least depths.
+    leaves: Vec<(f32, u32)>,
+}
+
+/// Four planes through the camera, beside the rays of a tile, and the direction in which it looks.
+struct Bundle {
+    sides: [Vector; 4],
+    /// Products of the sides and the place of the camera, and how far they may be off.
+    heights: [f32; 4],
+    slack: [f32; 4],
+    forward: Vector,
+    height: f32,
+}
+
+impl Tree {
+    /// Shows its triangles, of number `thing`, in a tile.
+    #[inline(always)]
+    pub(crate) fn fill(&self, frame: &Frame, thing: u32, waiting: &mut Waiting, tile: &mut Tile) {
+        let origin = self.origin_at(frame.turn_back(three!(k => -frame.pos[k])));
+        let bundle = Bundle::new(frame, &origin, tile);
+        if !self.leaves_of(&bundle, waiting, tile.farthest()) {
+            self.fill_by_ray(frame, &origin, thing, waiting, tile);
+            return;
+        }
+        let mut farthest = f32::INFINITY;
+        for &(near, leaf) in &waiting.leaves {
+            if near < farthest {
+                self.leaves[leaf as usize].fill(frame, &origin, thing, tile);
+                farthest = tile.farthest();
+            }
+        }
+    }
+
+    /// Finds the leaves that a tile may see, the nearest first; false if there are too many.
+    #[inline(always)]
+    fn leaves_of(&self, bundle: &Bundle, waiting: &mut Waiting, farthest: f32) -> bool {
+        let (stack, leaves) = (&mut waiting.stack.0, &mut waiting.leaves);
+        leaves.clear();
+        if self.nodes.is_empty() {
+            return true;
+        }
+        let mut count = 1;
+        stack[0] = (0.0, 0);
+        while count > 0 {
+            count -= 1;
+            let node = &self.nodes[stack[count].1 as usize];
+            let (near, mut bits) = bundle.boxes(node, farthest);
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & 7;
+                bits &= bits - 1;
+                let (near, child) = (near[lane], node.children[lane]);
+                if child & LEAF == 0 {
+                    stack[count] = (near, child);
+                    count += 1;
+                } else if leaves.len() == LEAVES_MAX {
+                    return false;
+                } else {
+                    let place = leaves
+                        .iter()
+                        .rposition(|other| other.0 <= near)
+                        .map_or(0, |before| before + 1);
+                    leaves.insert(place, (near, child & !LEAF));
+                }
+            }
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn fill_by_ray(
+        &self,
+        frame: &Frame,
+        origin: &Origin,
+        thing: u32,
+        waiting: &mut Waiting,
+        tile: &mut Tile,
+    ) {
+        for line in 0..EDGE {
+            let d = tile.directions(frame, line);
+            let mut lanes = [[0.0; EDGE]; 3];
+            for k in 0..3 {
+                d[k].store(&mut lanes[k]);
+            }
+            for lane in 0..EDGE {
+                let direction = three!(k => lanes[k][lane]);
+                let limit = tile.depth[line][lane];
+                if let Some(met) =
+                    self.cast(&mut waiting.stack, origin, direction, tile.near, limit)
+                {
+                    tile.depth[line][lane] = met.far;
+                    tile.things[line][lane] = thing;
+                    tile.triangles[line][lane] = met.number;
+                }
+            }
+        }
+    }
+}
+
+impl Bundle {
+    #[inline(always)]
+    fn new(frame: &Frame, origin: &Origin, tile: &Tile) -> Bundle {
+        let ([left, right], [top, bottom]) =
+            ([tile.x[0], tile.x[EDGE - 1]], [tile.y[0], tile.y[EDGE - 1]]);
+        // rays inside have positive products with them
+        let sides = [
+            [1.0, 0.0, -left],
+            [-1.0, 0.0, right],
+            [0.0, 1.0, -top],
+            [0.0, -1.0, bottom],
+        ];
+        let sides = [
+            frame.turn_back(sides[0]),
+            frame.turn_back(sides[1]),
+            frame.turn_back(sides[2]),
+            frame.turn_back(sides[3]),
+        ];
+        let (mut heights, mut slack) = ([0.0; 4], [0.0; 4]);
+        for side in 0..4 {
+            heights[side] = crate::vector::dot(sides[side], origin.pos);
+            slack[side] =
+                origin.slack * (sides[side][0].abs() + sides[side][1].abs() + sides[side][2].abs());
+        }
+        let forward = frame.rot[2];
+        Bundle {
+            sides,
+            heights,
+            slack,
+            forward,
+            height: crate::vector::dot(forward, origin.pos),
+        }
+    }
+
+    /// Least depths of the boxes of a node, and which may be seen.
+    #[inline(always)]
+    fn boxes(&self, node: &Node, farthest: f32) -> ([f32; 8], u32) {
+        let least = corner(node, self.forward, -1.0) - F32x8::k(self.height);
+        let mut is_outside = F32x8::k(farthest).lt(least);
+        for side in 0..4 {
+            let most = corner(node, self.sides[side], 1.0);
+            is_outside = is_outside | most.lt(F32x8::k(self.heights[side] - self.slack[side]));
+        }
+        let mut near = [0.0; 8];
+        least.store(&mut near);
+        // boxes of no child are infinite, so that products with them may be NaN
+        let is_box = F32x8::load(&node.low[0]).lt(F32x8::k(f32::INFINITY));
+        (near, F32x8::bits(is_box & !is_outside))
+    }
+}
+
+/// The largest products of a vector and the corners of boxes; with the sign -1, the smallest.
+#[inline(always)]
+fn corner(node: &Node, v: Vector, sign: f32) -> F32x8 {
+    let bounds = |k: usize| {
+        if sign * v[k] < 0.0 {
+            &node.low[k]
+        } else {
+            &node.high[k]
+        }
+    };
+    let [x, y, z] = [bounds(0), bounds(1), bounds(2)];
+    F32x8::load(z).fma(
+        F32x8::k(v[2]),
+        F32x8::load(y).fma(F32x8::k(v[1]), F32x8::load(x) * F32x8::k(v[0])),
+    )
+}
+
+/// Numbers of eight triangles, in the frame of the camera: factors of x, y and 1.
+struct Drawn {
+    against: [[f32; 8]; 3],
+    u: [[f32; 8]; 3],
+    v: [[f32; 8]; 3],
+    height: [f32; 8],
+    slack: [f32; 8],
+}
+
+impl Leaf {
+    #[inline(always)]
+    fn fill(&self, frame: &Frame, origin: &Origin, thing: u32, tile: &mut Tile) {
+        let (drawn, mut bits) = self.seen_from(frame, origin);
+        let x = F32x8::load(&tile.x);
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let all = |numbers: &[[f32; 8]; 3], k: usize| F32x8::k(numbers[k][lane]);
+            let (a_y, u_y, v_y) = (all(&drawn.against, 1), all(&drawn.u, 1), all(&drawn.v, 1));
+            let a_x = x.fma(all(&drawn.against, 0), all(&drawn.against, 2));
+            let u_x = x.fma(all(&drawn.u, 0), all(&drawn.u, 2));
+            let v_x = x.fma(all(&drawn.v, 0), all(&drawn.v, 2));
+            let (height, slack) = (F32x8::k(drawn.height[lane]), F32x8::k(-drawn.slack[lane]));
+            for line in 0..EDGE {
+                let y = F32x8::k(tile.y[line]);
+                let (a, u, v) = (y.fma(a_y, a_x), y.fma(u_y, u_x), y.fma(v_y, v_x));
+                let least = u.min(v).min(a - u - v);
+                let is_met = slack.lt(least) & height.lt(F32x8::load(&tile.depth[line]) * a);
+                if F32x8::any(is_met) {
+                    tile.keep(line, height.div(a), is_met, thing, self.number[lane]);
+                }
+            }
+        }
+    }
+
+    /// What the triangles need of rays, and which show their front.
+    #[inline(always)]
+    fn seen_from(&self, frame: &Frame, origin: &Origin) -> (Drawn, u32) {
+        let o = three!(k => F32x8::k(origin.pos[k]));
+        let normal = three!(k => -F32x8::load(&self.normal[k]));
+        let height = products(&self.normal, &o) - F32x8::load(&self.height);
+        let mut drawn = Drawn {
+            against: [[0.0; 8]; 3],
+            u: [[0.0; 8]; 3],
+            v: [[0.0; 8]; 3],
+            height: [0.0; 8],
+            slack: [0.0; 8],
+        };
+        turned(frame, &normal, &mut drawn.against);
+        for axis in 0..2 {
+            let across = &self.across[axis];
+            let start = products(across, &o) + F32x8::load(&self.start[axis]);
+            let factors = three!(k => start.fma(normal[k], height * F32x8::load(&across[k])));
+            turned(
+                frame,
+                &factors,
+                if axis == 0 {
+                    &mut drawn.u
+                } else {
+                    &mut drawn.v
+                },
+            );
+        }
+        height.store(&mut drawn.height);
+        (F32x8::k(origin.slack) * F32x8::load(&self.steep)).store(&mut drawn.slack);
+        (drawn, F32x8::bits(F32x8::k(0.0).lt(height)))
+    }
+}
+
+/// Vectors of a frame in its parent's.
+#[inline(always)]
+fn turned(frame: &Frame, v: &[F32x8; 3], to: &mut [[f32; 8]; 3]) {
+    for k in 0..3 {
+        let row = frame.rot[k];
+        v[2].fma(
+            F32x8::k(row[2]),
+            v[1].fma(F32x8::k(row[1]), v[0] * F32x8::k(row[0])),
+        )
+        .store(&mut to[k]);
+    }
+}
