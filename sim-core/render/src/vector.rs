@@ -1,40 +1,27 @@
 //! Vectors and frames in `f32`.
 
-/// The same expression of the places 0, 1 and 2. A closure in `map` would not have the instructions of its caller.
+/// The same expression of each place. A closure in `map` would not have the instructions of its caller.
+macro_rules! each {
+    ($k:ident in $($place:literal)* => $value:expr) => {
+        [$({
+            let $k: usize = $place;
+            $value
+        }),*]
+    };
+}
+/// Of the places 0, 1 and 2.
 macro_rules! three {
     ($k:ident => $value:expr) => {
-        [
-            {
-                let $k = 0_usize;
-                $value
-            },
-            {
-                let $k = 1_usize;
-                $value
-            },
-            {
-                let $k = 2_usize;
-                $value
-            },
-        ]
+        $crate::vector::each!($k in 0 1 2 => $value)
     };
 }
-/// The same of the places 0 and 1.
+/// Of the places 0 and 1.
 macro_rules! two {
     ($k:ident => $value:expr) => {
-        [
-            {
-                let $k = 0_usize;
-                $value
-            },
-            {
-                let $k = 1_usize;
-                $value
-            },
-        ]
+        $crate::vector::each!($k in 0 1 => $value)
     };
 }
-pub(crate) use {three, two};
+pub(crate) use {each, three, two};
 
 /// Three coordinates.
 pub(crate) type Vector = [f32; 3];

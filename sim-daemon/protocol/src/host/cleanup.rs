@@ -87,8 +87,8 @@ impl ClientCleanup {
     ///
     /// iceoryx2 leaves a connection that its owner had made and not yet marked as its own when it was killed, a service whose
     /// last node was killed while it removed it, and a node that was killed while it made or removed the files of its monitor.
-    /// A port and a service have a tag in a node's folder before they have files, and removing a mapped file
-    /// changes nothing.
+    /// A port and a service have a tag in a node's folder before they have files, and removing a file changes
+    /// nothing for those who map it.
     fn remove_orphans(&mut self) {
         let services = || self.services();
         // a folder that cannot be read tells nothing of its files
