@@ -18,7 +18,7 @@ mod stretch;
 mod tessellate;
 mod triangle_tree;
 mod trimesh;
-pub(crate) mod vector;
+pub mod vector;
 mod visual;
 
 pub use cache::keep_meshes;

@@ -2,13 +2,14 @@
 //! where a fused operation would be a library call.
 
 /// A point or direction.
-pub(crate) type Vector = [f64; 3];
+pub type Vector = [f64; 3];
 
 pub(super) fn add(a: Vector, b: Vector) -> Vector {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-pub(crate) fn sub(a: Vector, b: Vector) -> Vector {
+/// a - b.
+pub fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -16,11 +17,13 @@ pub(super) fn scale(a: Vector, s: f64) -> Vector {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
+/// a · b.
+pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
+/// a × b.
+pub fn cross(a: Vector, b: Vector) -> Vector {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

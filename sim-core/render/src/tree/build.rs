@@ -1,9 +1,9 @@
 //! Builds a tree: halves by the surface area heuristic, then eight children for each node.
 
+use sim_model::geometry::vector::{Vector as Point, cross, dot, sub};
+
 use super::{LEAF, Leaf, Node, STACK, Tree};
 use crate::vector::Vector;
-
-type Point = [f64; 3];
 
 /// Triangles of a leaf.
 const WIDTH: usize = 8;
@@ -291,20 +291,4 @@ fn leaf(numbers: &[usize], triangles: &[[Point; 3]]) -> Leaf {
         leaf.number[lane] = number as u32;
     }
     leaf
-}
-
-fn sub(a: Point, b: Point) -> Point {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }
