@@ -100,7 +100,7 @@ impl State {
             && lease.holder.is_some()
         {
             ClientCleanup::new(&self.node).clean();
-            if lease.is_over() || lease.is_silent() {
+            if lease.is_over() || lease.is_silent(self.polled) {
                 self.renew();
             }
         }

@@ -107,12 +107,14 @@ impl Lease {
 
     /// Whether the holder is gone: its publisher went, by release or because a dead process was cleaned up.
     pub(super) fn is_over(&mut self) -> bool {
-        let publishers = self.commands.dynamic_config().number_of_publishers();
         let Some(holder) = &mut self.holder else {
             return false;
         };
+        // first: a daemon that is stopped here sees a holder that came meanwhile
+        let is_late = holder.since.elapsed() > JOIN_MAX;
+        let publishers = self.commands.dynamic_config().number_of_publishers();
         holder.joined |= publishers > 0;
-        publishers == 0 && (holder.joined || holder.since.elapsed() > JOIN_MAX)
+        publishers == 0 && (holder.joined || is_late)
     }
 
     /// The holder's process, unless it is gone.
@@ -123,11 +125,20 @@ impl Lease {
         self.holder.as_ref().map(|holder| holder.pid)
     }
 
-    /// Whether the holder has been silent for too long.
-    pub(super) fn is_silent(&self) -> bool {
+    /// Whether the holder had been silent for too long when a look around began: the heartbeats that came after that may
+    /// wait unread.
+    pub(super) fn is_silent(&self, polled: Instant) -> bool {
         self.holder
             .as_ref()
-            .is_some_and(|holder| holder.beat.elapsed() > SILENCE_MAX)
+            .is_some_and(|holder| polled.duration_since(holder.beat) > SILENCE_MAX)
+    }
+
+    /// Leaves out a time until `now` in which the daemon looked at no heartbeats.
+    pub(super) fn leave_out(&mut self, gap: Duration, now: Instant) {
+        if let Some(holder) = &mut self.holder {
+            // one that was read at the end of that time is no later than now
+            holder.beat = (holder.beat + gap).min(now);
+        }
     }
 
     /// Lets go of the slots of dead processes, and meets new ones.

@@ -312,15 +312,13 @@ impl State {
 
     /// Looks at control requests, leases, observers and recorders.
     pub(super) fn poll_services(&mut self) -> Option<Next> {
-        let gap = self.polled.elapsed();
-        self.polled = Instant::now();
+        let now = Instant::now();
+        let gap = now.duration_since(self.polled);
+        self.polled = now;
         if gap > HELD_UP
-            && let Some(Lease {
-                holder: Some(holder),
-                ..
-            }) = &mut self.lease
+            && let Some(lease) = &mut self.lease
         {
-            holder.beat += gap; // the heartbeats of that time wait unread
+            lease.leave_out(gap, now); // the heartbeats of that time wait unread
         }
         if self.stop.load(Ordering::Relaxed) {
             return Some(Next::End);

@@ -1,6 +1,7 @@
 //! A host without physics against clients that send nonsense.
 
 mod fake;
+mod silence;
 mod unreached;
 
 use std::process::Stdio;

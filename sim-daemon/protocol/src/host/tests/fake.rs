@@ -67,11 +67,16 @@ impl Worlds for Counted<'_> {
     }
 }
 
-/// Serves until it is stopped; sends word when clients may come.
-fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
+/// The host of such a daemon.
+pub(super) fn open(paths: &DaemonPaths, stop: Arc<AtomicBool>) -> Host {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let daemon_lock = DaemonLock::take(paths).unwrap();
-    let mut host = Host::open(daemon_lock, description(), table, &[], stop).unwrap();
+    Host::open(daemon_lock, description(), table, &[], stop).unwrap()
+}
+
+/// Serves until it is stopped; sends word when clients may come.
+fn serve(paths: &DaemonPaths, stop: Arc<AtomicBool>, ready: Sender<()>, takes: Duration) {
+    let mut host = open(paths, stop);
     let mut cleanup = host.client_cleanup();
     ready.send(()).unwrap();
     let (mut count, mut owned) = (0, Vec::new());
