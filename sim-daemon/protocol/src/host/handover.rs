@@ -5,6 +5,7 @@ use super::lease::Lease;
 use super::state::State;
 use super::worlds::S;
 use crate::ProtocolError;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
 use crate::memory::guard::guarded;
 use crate::transport::Asked;
 use crate::transport::budget;
@@ -95,12 +96,12 @@ impl State {
     }
 
     /// Grants the lease, or says why not; nothing as long as the last one is handed over.
-    pub(super) fn acquire(&mut self, pid: u32) -> Option<Response> {
+    pub(super) fn acquire(&mut self, pid: u32, client: UniqueClientId) -> Option<Response> {
         if let Some(lease) = &mut self.lease
             && lease.holder.is_some()
         {
             ClientCleanup::new(&self.node).clean();
-            if lease.is_over() || lease.is_silent(self.polled) {
+            if lease.is_over(&self.control) || lease.is_silent(self.polled) {
                 self.renew();
             }
         }
@@ -133,7 +134,7 @@ impl State {
                 ..
             }) => Response::Held { pid: holder.pid },
             Some(lease) => {
-                lease.grant(pid);
+                lease.grant(pid, client);
                 Response::Granted { epoch: lease.epoch }
             }
         })

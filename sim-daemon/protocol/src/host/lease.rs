@@ -3,13 +3,16 @@
 use std::time::Duration;
 
 use super::worlds::S;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
 use crate::doors::iceoryx2::port::update_connections::UpdateConnections;
 use crate::doors::iceoryx2::prelude::{Node, PortFactory};
 use crate::doors::sync::{Arc, Weak};
 use crate::doors::time::Instant;
 use crate::memory::mapping::{self, Pages};
 use crate::transport::budget::slot_bytes;
-use crate::transport::{self, CommandService, CommandSubscriber, FramePublisher, Waker};
+use crate::transport::{
+    self, CommandService, CommandSubscriber, ControlService, FramePublisher, Waker,
+};
 use crate::{ProtocolError, Table};
 
 /// A holder whose heartbeats stopped for this long loses the lease when somebody else asks for it.
@@ -52,6 +55,8 @@ pub(super) struct Lease {
 #[derive(Debug)]
 pub(super) struct Holder {
     pub(super) pid: u32,
+    /// Of the control service: the one that asked.
+    client: UniqueClientId,
     pub(super) since: Instant,
     pub(super) beat: Instant,
     joined: bool,
@@ -88,10 +93,11 @@ impl Lease {
         })
     }
 
-    pub(super) fn grant(&mut self, pid: u32) {
+    pub(super) fn grant(&mut self, pid: u32, client: UniqueClientId) {
         let now = Instant::now();
         self.holder = Some(Holder {
             pid,
+            client,
             since: now,
             beat: now,
             joined: false,
@@ -105,21 +111,23 @@ impl Lease {
         }
     }
 
-    /// Whether the holder is gone: its publisher went, by release or because a dead process was cleaned up.
-    pub(super) fn is_over(&mut self) -> bool {
+    /// Whether the holder is gone: its publisher went, by release or because a dead process was cleaned up, or will never come.
+    pub(super) fn is_over(&mut self, control: &ControlService<S>) -> bool {
         let Some(holder) = &mut self.holder else {
             return false;
         };
         // first: a daemon that is stopped here sees a holder that came meanwhile
-        let is_late = holder.since.elapsed() > JOIN_MAX;
+        let is_missed = !holder.joined
+            && (holder.since.elapsed() > JOIN_MAX
+                || !transport::is_present(control, holder.client));
         let publishers = self.commands.dynamic_config().number_of_publishers();
         holder.joined |= publishers > 0;
-        publishers == 0 && (holder.joined || is_late)
+        publishers == 0 && (holder.joined || is_missed)
     }
 
     /// The holder's process, unless it is gone.
-    pub(super) fn present_holder(&mut self) -> Option<u32> {
-        if self.is_over() {
+    pub(super) fn present_holder(&mut self, control: &ControlService<S>) -> Option<u32> {
+        if self.is_over(control) {
             return None;
         }
         self.holder.as_ref().map(|holder| holder.pid)

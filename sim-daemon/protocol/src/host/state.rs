@@ -123,7 +123,8 @@ impl State {
             let response = match serde_json::from_slice(active.payload()) {
                 Ok(Request::Describe) => Response::Described,
                 Ok(Request::Controller) => {
-                    let pid = self.lease.as_mut().and_then(Lease::present_holder);
+                    let (lease, control) = (self.lease.as_mut(), &self.control);
+                    let pid = lease.and_then(|lease| lease.present_holder(control));
                     let lease = self.lease.as_ref().filter(|_| pid.is_some());
                     let epoch = lease.map(|lease| lease.epoch);
                     Response::Controller { pid, epoch }
@@ -170,7 +171,7 @@ impl State {
             respond(&active, &response);
         }
         for (active, pid) in later {
-            match self.acquire(pid) {
+            match self.acquire(pid, active.origin()) {
                 Some(response) => respond(&active, &response),
                 None => self.handover.postpone(active, pid),
             }
@@ -326,7 +327,10 @@ impl State {
         // what panics over damaged memory loses those who use it, and nobody else
         self.mark_damage();
         let next = guarded(|| self.control()).flatten();
-        let is_over = guarded(|| self.lease.as_mut().is_some_and(Lease::is_over));
+        let is_over = guarded(|| {
+            let lease = self.lease.as_mut();
+            lease.is_some_and(|lease| lease.is_over(&self.control))
+        });
         if is_over.unwrap_or(true) {
             self.renew();
         }

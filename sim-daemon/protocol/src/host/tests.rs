@@ -220,7 +220,16 @@ fn a_holder_that_died_before_it_came_holds_nothing() {
     let mut dead = std::process::Command::new(program);
     let mut dead = dead.stdout(Stdio::null()).spawn().unwrap();
     dead.wait().unwrap();
-    assert!(fake.attach().ask_for_lease(dead.id()));
+    let client = fake.attach();
+    assert!(client.ask_for_lease(dead.id()));
+    fake.attach().step(&[], &mut keep_waiting()).unwrap();
+}
+
+#[test]
+fn a_client_that_goes_before_it_opens_its_ports_holds_nothing() {
+    let fake = Fake::start("unopened-ports");
+    // as one whose call was interrupted, in a process that lives
+    assert!(fake.attach().ask_for_lease(std::process::id()));
     fake.attach().step(&[], &mut keep_waiting()).unwrap();
 }
 

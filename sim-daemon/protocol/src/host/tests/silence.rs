@@ -3,9 +3,11 @@
 use std::time::{Duration, Instant};
 
 use super::fake::open;
+use crate::doors::iceoryx2::identifiers::UniqueClientId;
 use crate::host::Host;
 use crate::host::lease::Holder;
 use crate::presence::paths::DaemonPaths;
+use crate::transport;
 use crate::wire::control::Response;
 
 /// Longer than a holder may be silent.
@@ -13,14 +15,16 @@ const LONG: Duration = Duration::from_secs(3);
 /// Who holds the lease, and who asks for it.
 const PIDS: [u32; 2] = [1, 2];
 
-/// Calls with a host whose lease is held.
-fn with_holder(test: &str, call: impl FnOnce(&mut Host)) {
+/// Calls with a host whose lease is held, and with the client that holds it.
+fn with_holder(test: &str, call: impl FnOnce(&mut Host, UniqueClientId)) {
     let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
     let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
     let mut host = open(&paths, std::sync::Arc::default());
-    host.state.lease.as_mut().unwrap().grant(PIDS[0]);
-    call(&mut host);
-    drop(host);
+    let requester = transport::requester(&host.state.node).unwrap();
+    let lease = host.state.lease.as_mut().unwrap();
+    lease.grant(PIDS[0], requester.id());
+    call(&mut host, requester.id());
+    drop((requester, host));
     std::fs::remove_dir(&root).expect("nothing is left in the root folder");
 }
 
@@ -30,11 +34,11 @@ fn holder(host: &mut Host) -> &mut Holder {
 
 #[test]
 fn a_daemon_that_is_stopped_while_it_looks_around_takes_no_lease_back() {
-    with_holder("looking", |host| {
+    with_holder("looking", |host, client| {
         let begin = Instant::now() - LONG;
         host.state.polled = begin;
         holder(host).beat = begin;
-        let answer = host.state.acquire(PIDS[1]);
+        let answer = host.state.acquire(PIDS[1], client);
         let is_held = matches!(answer, Some(Response::Held { pid }) if pid == PIDS[0]);
         assert!(is_held, "{answer:?}");
     });
@@ -42,10 +46,10 @@ fn a_daemon_that_is_stopped_while_it_looks_around_takes_no_lease_back() {
 
 #[test]
 fn a_lease_goes_from_a_holder_that_is_silent_while_the_daemon_looks() {
-    with_holder("silent", |host| {
+    with_holder("silent", |host, client| {
         host.state.polled = Instant::now();
         holder(host).beat = host.state.polled - LONG;
-        let answer = host.state.acquire(PIDS[1]);
+        let answer = host.state.acquire(PIDS[1], client);
         let is_granted = matches!(answer, Some(Response::Granted { epoch: 2 }));
         assert!(is_granted, "{answer:?}");
     });
@@ -53,7 +57,7 @@ fn a_lease_goes_from_a_holder_that_is_silent_while_the_daemon_looks() {
 
 #[test]
 fn a_heartbeat_that_a_stopped_daemon_read_late_counts_once() {
-    with_holder("late", |host| {
+    with_holder("late", |host, _| {
         let begin = Instant::now() - LONG;
         host.state.polled = begin;
         // right after it went on, and still in the same look around
