@@ -433,6 +433,8 @@ impl Awaited<FrameSample> for Answer<'_> {
         intact_lease(self.peer, self.epoch)?;
         self.peer.check_reach(self.reach)?;
         if self.service.dynamic_config().number_of_publishers() == 0 {
+            // that the daemon has ended since explains more
+            self.peer.check()?;
             return Err(self.peer.lease_lost());
         }
         if self.since.elapsed() > ANSWER_MAX {
