@@ -1,7 +1,8 @@
 //! A host without physics against clients that send nonsense.
 
+mod control;
 mod fake;
-mod silence;
+mod leases;
 mod unreached;
 
 use std::process::Stdio;

@@ -6,7 +6,9 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
 use super::super::*;
-use crate::presence::paths::DaemonPaths;
+use crate::presence::connection::Connection;
+use crate::presence::liveness::Peer;
+use crate::presence::paths::{DaemonPaths, Presence};
 use crate::{AttachOptions, Client, Dtype, InputInfo, keep_waiting};
 
 /// Bytes of the state of the daemon: several entries long.
@@ -72,6 +74,26 @@ pub(super) fn open(paths: &DaemonPaths, stop: Arc<AtomicBool>) -> Host {
     let table = Table::over_arena([("count".to_owned(), Dtype::U64, vec![2], 0)], 64);
     let daemon_lock = DaemonLock::take(paths).unwrap();
     Host::open(daemon_lock, description(), table, &[], stop).unwrap()
+}
+
+/// Calls with a host that nobody else looks after.
+pub(super) fn alone(test: &str, call: impl FnOnce(&mut Host)) {
+    let root = std::env::temp_dir().join(format!("tightloop-{test}-{}", std::process::id()));
+    let paths = DaemonPaths::new(Some(&root), "fake").unwrap();
+    let mut host = open(&paths, Arc::default());
+    call(&mut host);
+    drop(host);
+    std::fs::remove_dir(&root).expect("nothing is left in the root folder");
+}
+
+/// A connection to such a host, which need not answer for it.
+pub(super) fn connect(host: &Host) -> Connection {
+    let paths = host.daemon_lock().paths().clone();
+    let Ok(Presence::Running(beacon)) = paths.presence() else {
+        panic!("it has announced itself");
+    };
+    let peer = Peer::find(paths, beacon).unwrap();
+    Connection::open(&peer, &mut keep_waiting()).unwrap().0
 }
 
 /// Serves until it is stopped; sends word when clients may come.
