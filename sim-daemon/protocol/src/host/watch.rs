@@ -94,3 +94,42 @@ impl Watch {
             .is_some_and(|place| place.paths().is_asked_to_stop())
     }
 }
+
+#[cfg(all(test, not(simulated)))]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    #[test]
+    fn a_signal_asks_the_loops_of_a_daemon_to_stop() {
+        let (end, ended) = channel();
+        let watch = Watch {
+            stop: Arc::default(),
+            signalled: Arc::new(AtomicBool::new(true)),
+            parent: None,
+            places: Places::default(),
+        };
+        let stop = Arc::clone(&watch.stop);
+        let waits = std::thread::spawn(move || {
+            let start = Instant::now();
+            while !stop.load(Ordering::Relaxed) && start.elapsed() < GRACE / 2 {
+                std::thread::yield_now();
+            }
+            drop(end);
+        });
+        watch.run(&ended, |reason| panic!("{reason}"));
+        waits.join().unwrap();
+        assert!(watch.stop.load(Ordering::Relaxed));
+    }
+
+    #[test]
+    fn no_place_is_kept_after_the_files_of_all_were_removed() {
+        let places = Places::default();
+        places.remove();
+        assert!(
+            places.0.try_lock().is_err(),
+            "another thread could keep one"
+        );
+    }
+}

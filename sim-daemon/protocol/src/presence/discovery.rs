@@ -86,3 +86,49 @@ pub fn find(name: &str, options: &AttachOptions, hook: Hook<'_>) -> Result<Beaco
     }
     Ok(beacon)
 }
+
+#[cfg(all(test, not(simulated)))]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::presence::daemon_lock::DaemonLock;
+
+    /// Longer than anybody waits here.
+    const LONG: Duration = Duration::from_secs(6);
+
+    #[test]
+    fn who_holds_a_name_and_does_not_serve_is_waited_for_and_not_for_ever() {
+        let root = std::env::temp_dir().join(format!("tightloop-found-{}", std::process::id()));
+        let paths = DaemonPaths::new(Some(&root), "held").unwrap();
+        let look = |wait| {
+            let (root, start) = (Some(root.clone()), Instant::now());
+            let mut hook = || match start.elapsed() < LONG {
+                true => ControlFlow::Continue(()),
+                false => ControlFlow::Break(()),
+            };
+            let refused = find("held", &AttachOptions { root, wait }, &mut hook).unwrap_err();
+            (refused, start.elapsed())
+        };
+        let held = DaemonLock::take(&paths).unwrap();
+        let wait = Duration::from_millis(100);
+        let (refused, took) = look(wait);
+        assert!(
+            matches!(refused, ProtocolError::Starting { .. }),
+            "{refused}"
+        );
+        assert!(took >= wait, "{took:?}");
+        held.withdraw();
+        let (refused, took) = look(wait);
+        assert!(matches!(refused, ProtocolError::Silent { .. }), "{refused}");
+        assert!(took >= SILENCE_MAX, "{took:?}");
+        drop(held);
+        let (refused, took) = look(wait);
+        assert!(
+            matches!(refused, ProtocolError::NoDaemon { .. }),
+            "{refused}"
+        );
+        assert!(took >= wait, "{took:?}");
+        std::fs::remove_dir(&root).unwrap();
+    }
+}

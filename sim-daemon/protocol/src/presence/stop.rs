@@ -108,6 +108,21 @@ mod tests {
     }
 
     #[test]
+    fn a_request_that_no_daemon_is_left_to_hear_is_taken_back() {
+        let root = root("unheard");
+        let paths = DaemonPaths::new(Some(&root), "unheard").unwrap();
+        let held = DaemonLock::take(&paths).unwrap();
+        drop(asked(&paths).unwrap());
+        assert!(paths.is_asked_to_stop(), "a daemon hears it");
+        drop(held);
+        let unheard = asked(&paths).unwrap();
+        assert!(paths.is_asked_to_stop());
+        drop(unheard);
+        assert!(!paths.is_asked_to_stop());
+        fs::remove_dir(&root).unwrap();
+    }
+
+    #[test]
     fn who_stops_a_group_waits_for_its_daemon() {
         let root = root("group");
         let paths = DaemonPaths::new(Some(&root), "many").unwrap();

@@ -26,7 +26,9 @@ fn a_name_is_taken_once_and_leaves_nothing() {
     assert_eq!(running(Some(&root)).unwrap(), ["one"]);
     let error = DaemonLock::take(&paths).unwrap_err().to_string();
     assert!(error.contains(&std::process::id().to_string()), "{error}");
+    let start = Instant::now();
     assert!(!cleanup_after_death(Some(&root), "one").unwrap());
+    assert!(start.elapsed() < LOOK_MAX, "it runs, and is waited for");
     drop(first);
     assert_eq!(paths.presence().unwrap(), Presence::Absent);
     assert!(!Path::new(shared_memory()).join(paths.stem()).exists());
@@ -138,6 +140,38 @@ fn what_a_killed_daemon_left_is_swept() {
     fs::write(&shared, "x").unwrap();
     sweep(Some(&root)).unwrap();
     assert!(!shared.exists() && !paths.lock_path().exists());
+    fs::remove_dir(&root).unwrap();
+}
+
+#[test]
+fn the_next_daemon_of_a_name_keeps_nothing_of_one_that_was_killed() {
+    let root = root("successor");
+    let paths = DaemonPaths::new(Some(&root), "next").unwrap();
+    fs::write(paths.lock_path(), "tightloop 1 1 0000000000000001\n").unwrap();
+    let shared = paths.shared_folder().join("00000001_5.data");
+    private_folder(&paths.shared_folder()).unwrap();
+    fs::write(&shared, "x").unwrap();
+    let held = DaemonLock::take(&paths).unwrap();
+    assert_eq!(paths.presence().unwrap(), Presence::Starting);
+    assert!(!shared.exists());
+    drop(held);
+    fs::remove_dir(&root).unwrap();
+}
+
+#[test]
+fn files_that_a_daemon_has_removed_are_not_removed_again() {
+    let root = root("again");
+    let paths = DaemonPaths::new(Some(&root), "again").unwrap();
+    let first = DaemonLock::take(&paths).unwrap();
+    let remains = first.remains();
+    remains.remove();
+    // while the process of the first one ends
+    let second = DaemonLock::take(&paths).unwrap();
+    remains.remove();
+    assert!(paths.shared_folder().join(PLACE).exists());
+    drop(first);
+    assert!(paths.lock_path().exists() && paths.shared_folder().join(PLACE).exists());
+    drop(second);
     fs::remove_dir(&root).unwrap();
 }
 
