@@ -4,14 +4,15 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::fake::{Fake, alone, connect};
+use super::fake::{Counted, Fake, STATE, alone, connect};
+use crate::host::journal::RECORDERS_MAX;
 use crate::host::{Host, Next};
 use crate::presence::daemon_lock::DaemonLock;
 use crate::presence::paths::{DaemonPaths, Presence};
 use crate::transport;
 use crate::waiting::waiter::Awaited;
 use crate::wire::control::Request;
-use crate::{AttachOptions, Client, PROTOCOL_VERSION, ProtocolError, keep_waiting};
+use crate::{AttachOptions, Client, Op, PROTOCOL_VERSION, ProtocolError, keep_waiting};
 
 /// Longer than anything here takes, and than a holder may be silent.
 const LONG: Duration = Duration::from_millis(2500);
@@ -259,4 +260,45 @@ fn a_request_that_the_daemon_cannot_read_ends_with_its_reason() {
             "{refused:?}"
         );
     });
+}
+
+#[test]
+fn a_recorder_gets_the_inputs_of_a_step_whose_client_has_gone() {
+    alone("inputs", |host| {
+        let record = |client: Client| {
+            let mut journal = client.journal(&[], &mut keep_waiting()).unwrap();
+            client.send(&[], &mut keep_waiting()).unwrap();
+            loop {
+                let entry = journal.next(LONG, &mut keep_waiting()).unwrap();
+                let header = entry.map(|entry| *entry.header());
+                if header.is_none_or(|header| !header.is_state()) {
+                    return header.map(|header| (header.op, header.digests));
+                }
+            }
+        };
+        let recorded = beside(host, record, |host| {
+            host.record_state(&[1; STATE], false);
+            if host.is_recorded() && host.state.poll().unwrap() == Some(Next::Command) {
+                host.state.lease = None;
+                let mut worlds = Counted(1, Duration::ZERO, &mut Vec::new());
+                host.answer(Instant::now(), &mut worlds);
+            }
+        });
+        assert_eq!(recorded, Some((Op::Step as u32, 0)));
+    });
+}
+
+#[test]
+fn a_recorder_that_goes_makes_room_at_once() {
+    let fake = Fake::start("room");
+    let record = |client: Client| {
+        let journal = client.journal(&[], &mut keep_waiting());
+        journal.map(|journal| (journal, client))
+    };
+    let clients: Vec<_> = (0..=RECORDERS_MAX).map(|_| fake.attach()).collect();
+    let mut recorders: Vec<_> = clients.into_iter().map(record).collect();
+    assert!(recorders.pop().unwrap().is_err(), "all are at work");
+    let next = fake.attach();
+    drop(recorders.pop());
+    assert!(next.ask_for_journal());
 }

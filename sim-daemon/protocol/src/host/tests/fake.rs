@@ -47,7 +47,7 @@ fn description() -> Description {
 }
 
 /// Worlds whose frames and state are a number; the state takes a time to give. They own the pages of frames, as a GPU does.
-struct Counted<'a>(u64, Duration, &'a mut Vec<Arc<Pages>>);
+pub(super) struct Counted<'a>(pub u64, pub Duration, pub &'a mut Vec<Arc<Pages>>);
 
 impl Worlds for Counted<'_> {
     fn frame(&mut self, arena: &mut [u64], memory: Option<&FrameMemory>) -> bool {
