@@ -90,13 +90,18 @@ fn a_lease_that_another_client_of_the_process_got_meanwhile_is_held() {
 #[test]
 fn who_waits_for_a_frame_hears_that_the_lease_has_gone() {
     alone("gone-lease", |host| {
-        let begin = Instant::now();
-        let step = |client: Client| client.step(&[], &mut keep_waiting()).map(drop);
+        let step = |client: Client| {
+            let begin = Instant::now();
+            let mut hook = || match begin.elapsed() < LONG {
+                true => ControlFlow::Continue(()),
+                false => ControlFlow::Break(()),
+            };
+            client.step(&[], &mut hook).map(drop)
+        };
         let stepped = beside(host, step, |host| {
             if host.state.poll().unwrap() == Some(Next::Command) {
                 host.state.renew();
             }
-            assert!(begin.elapsed() < 4 * LONG, "nobody hears it");
         });
         assert!(
             matches!(stepped, Err(ProtocolError::LeaseLost { .. })),
@@ -143,24 +148,6 @@ fn who_ends_a_daemon_that_has_ended_asks_nothing_of_the_next_one() {
     assert!(!paths.is_asked_to_stop());
     drop((next, client));
     std::fs::remove_dir(paths.root()).unwrap();
-}
-
-#[test]
-fn a_daemon_that_steps_without_a_pause_answers_others() {
-    let fake = Fake::start("busy");
-    let (client, other) = (fake.attach(), fake.attach());
-    let (is_done, begin) = (AtomicBool::new(false), Instant::now());
-    let took = std::thread::scope(|scope| {
-        scope.spawn(|| {
-            while !is_done.load(Ordering::Relaxed) && begin.elapsed() < LONG {
-                client.step(&[], &mut keep_waiting()).unwrap();
-            }
-        });
-        other.timing(false, &mut keep_waiting()).unwrap();
-        is_done.store(true, Ordering::Relaxed);
-        begin.elapsed()
-    });
-    assert!(took < LONG, "{took:?}");
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! Who holds a lease: holders that are silent, daemons that were held up while these were not, and what comes late.
 
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::fake::{alone, connect};
-use super::send;
+use super::{Clients, send};
 use crate::doors::iceoryx2::identifiers::UniqueClientId;
 use crate::host::lease::Holder;
-use crate::host::{Host, Next};
-use crate::transport;
+use crate::host::{AROUND_PERIOD, Host, Next};
+use crate::presence::connection::Connection;
+use crate::transport::{self, CommandPublisher, FrameSubscriber};
 use crate::waiting::waiter::Awaited;
 use crate::wire::command::command_bytes;
 use crate::wire::control::{Request, Response};
@@ -122,28 +124,43 @@ fn a_release_comes_before_a_request_for_the_lease_that_was_sent_after_it() {
     }
 }
 
+/// Ports of the client of the first lease.
+fn ports(
+    host: &Host,
+    connection: &Connection,
+) -> (CommandPublisher<Clients>, FrameSubscriber<Clients>) {
+    let bytes = command_bytes(&host.state.description);
+    let ports = connection.with_node(|node| {
+        let commands = transport::open_commands(node, 1)?;
+        let publisher = transport::command_publisher(&commands, bytes)?;
+        let frames = transport::frame_subscriber(&transport::open_frames(node, 1)?)?;
+        Ok((publisher, frames))
+    });
+    ports.unwrap()
+}
+
+/// The first step of that client.
+fn step(host: &Host) -> (CommandHeader, Vec<u64>) {
+    let table = Table::lay_out([("joint_f".to_owned(), Dtype::F32, vec![2, 3], 0)]);
+    let mut payload = vec![0; table.total_bytes() / 8];
+    payload[..table.words().len()].copy_from_slice(table.words());
+    let header = CommandHeader {
+        session: host.state.description.session,
+        epoch: 1,
+        seq: 1,
+        op: Op::Step as u32,
+        rows: 1,
+        ..CommandHeader::default()
+    };
+    (header, payload)
+}
+
 #[test]
 fn a_command_is_carried_out_once_and_only_for_its_own_lease() {
     with_holder("once", |host, _| {
         let connection = connect(host);
-        let ports = connection.with_node(|node| {
-            let commands = transport::open_commands(node, 1)?;
-            let bytes = command_bytes(&host.state.description);
-            let publisher = transport::command_publisher(&commands, bytes)?;
-            let frames = transport::frame_subscriber(&transport::open_frames(node, 1)?)?;
-            Ok((publisher, frames))
-        });
-        let (publisher, frames) = ports.unwrap();
-        let table = Table::lay_out([("joint_f".to_owned(), Dtype::F32, vec![2, 3], 0)]);
-        let mut payload = vec![0; table.total_bytes() / 8];
-        payload[..table.words().len()].copy_from_slice(table.words());
-        let step = CommandHeader {
-            session: host.state.description.session,
-            epoch: 1,
-            op: Op::Step as u32,
-            rows: 1,
-            ..CommandHeader::default()
-        };
+        let (publisher, frames) = ports(host, &connection);
+        let (step, payload) = step(host);
         for (epoch, seq, is_carried_out) in
             [(1, 1, true), (1, 1, false), (2, 2, false), (1, 2, true)]
         {
@@ -154,11 +171,24 @@ fn a_command_is_carried_out_once_and_only_for_its_own_lease() {
             assert_eq!(refusal.is_some(), !is_carried_out, "{epoch}, {seq}");
         }
         // a daemon that ends says so by going
-        host.state.stop.store(true, super::Ordering::Relaxed);
+        host.state.stop.store(true, Ordering::Relaxed);
         host.state.refuse(RefusalKind::Stale, "nobody waits");
         assert!(frames.receive().unwrap().is_none());
-        host.state
-            .refuse(RefusalKind::Malformed, "it makes no sense");
+        host.state.refuse(RefusalKind::Malformed, "no sense");
         assert!(frames.receive().unwrap().is_some());
+    });
+}
+
+#[test]
+fn a_request_is_heard_while_commands_come_without_a_pause() {
+    with_holder("heard", |host, _| {
+        let connection = connect(host);
+        let (publisher, _frames) = ports(host, &connection);
+        let (step, payload) = step(host);
+        send(&publisher, step, &payload);
+        connection.post(&Request::Shutdown);
+        host.state.polled = Instant::now() - 2 * AROUND_PERIOD;
+        assert_eq!(host.wait().unwrap(), Next::End);
+        assert_eq!(host.wait().unwrap(), Next::Command);
     });
 }
