@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::fake::{Counted, Fake, STATE, alone, connect};
 use crate::host::journal::RECORDERS_MAX;
 use crate::host::{Host, Next};
+use crate::memory::service::AnyThread;
 use crate::presence::daemon_lock::DaemonLock;
 use crate::presence::paths::{DaemonPaths, Presence};
 use crate::transport;
@@ -288,4 +289,28 @@ fn a_recorder_that_goes_makes_room_at_once() {
     let next = fake.attach();
     drop(recorders.pop());
     assert!(next.ask_for_journal());
+}
+
+#[test]
+fn a_client_that_comes_while_the_last_place_is_given_back_gets_it() {
+    alone("crowded", |host| {
+        let session = host.state.description.session;
+        let config = host.daemon_lock().paths().transport_config(session);
+        let mut crowd = Vec::new();
+        loop {
+            let node = transport::node::<AnyThread>(&config, "client").unwrap();
+            match transport::open_wake(&node, "fake") {
+                Ok(wake) => crowd.push((wake, node)),
+                Err(ProtocolError::TooManyClients { .. }) => break,
+                Err(error) => panic!("{error}"),
+            }
+        }
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(OPENING);
+                drop(crowd.pop());
+            });
+            connect(host)
+        });
+    });
 }
