@@ -69,6 +69,28 @@ fn a_lease_that_goes_while_its_ports_are_opened_is_asked_for_again() {
 }
 
 #[test]
+fn a_lease_whose_ports_cannot_be_opened_is_given_back_at_once() {
+    alone("unopenable", |host| {
+        let services = host.daemon_lock().paths().shared_folder().join("services");
+        let list = || {
+            let entries = std::fs::read_dir(&services).unwrap();
+            let files = entries.map(|entry| entry.unwrap().path());
+            files.collect::<std::collections::BTreeSet<_>>()
+        };
+        let before = list();
+        host.state.renew();
+        let made = list();
+        for file in made.difference(&before) {
+            std::fs::remove_file(file).unwrap();
+        }
+        let acquire = |client: Client| client.acquire(&mut keep_waiting()).map(|()| client);
+        let acquired = beside(host, acquire, |_| ());
+        assert!(acquired.is_ok(), "{:?}", acquired.err());
+        assert!(is_granted(host, 3));
+    });
+}
+
+#[test]
 fn a_lease_that_another_client_of_the_process_got_meanwhile_is_held() {
     alone("of-process", |host| {
         let other = transport::requester(&host.state.node).unwrap();
