@@ -68,6 +68,7 @@ fn a_lease_that_goes_while_its_ports_are_opened_is_asked_for_again() {
     }
 }
 
+#[cfg(unix)] // Windows keeps files that are open
 #[test]
 fn a_lease_whose_ports_cannot_be_opened_is_given_back_at_once() {
     alone("unopenable", |host| {
@@ -213,6 +214,7 @@ fn a_client_is_refused_more_frames_than_it_may_hold() {
     observer.latest(&mut keep_waiting()).unwrap();
 }
 
+#[cfg(unix)] // Windows keeps files that are open
 #[test]
 fn a_client_goes_on_with_its_daemon_after_a_logout() {
     let fake = Fake::start("went");
@@ -240,6 +242,7 @@ fn ports_that_cannot_be_opened_at_once_are_tried_again() {
     });
 }
 
+#[cfg(unix)] // Windows keeps files that are open
 #[test]
 fn a_request_that_the_daemon_cannot_read_ends_with_its_reason() {
     alone("unread", |host| {
