@@ -135,6 +135,31 @@ fn who_waits_for_a_frame_hears_that_the_lease_has_gone() {
 }
 
 #[test]
+fn a_step_after_one_that_was_interrupted_gets_its_own_frame() {
+    alone("own-frame", |host| {
+        let (answers, mut owned) = (AtomicBool::new(false), Vec::new());
+        let step = |client: Client| {
+            client.acquire(&mut keep_waiting()).unwrap();
+            let interrupted = client.step(&[], &mut || ControlFlow::Break(()));
+            assert!(
+                matches!(interrupted, Err(ProtocolError::Interrupted)),
+                "{interrupted:?}"
+            );
+            answers.store(true, Ordering::Relaxed);
+            let frame = client.step(&[], &mut keep_waiting()).unwrap();
+            frame.header().ack_seq
+        };
+        let acknowledged = beside(host, step, |host| {
+            if answers.load(Ordering::Relaxed) && host.state.poll().unwrap().is_some() {
+                let mut worlds = Counted(1, Duration::ZERO, &mut owned);
+                host.answer(Instant::now(), &mut worlds);
+            }
+        });
+        assert_eq!(acknowledged, 2);
+    });
+}
+
+#[test]
 fn a_client_that_ends_a_daemon_asks_by_a_message_and_by_a_file() {
     alone("asked", |host| {
         let (connection, is_heard) = (connect(host), AtomicBool::new(false));
