@@ -239,12 +239,16 @@ impl DaemonPaths {
 
     /// Whether a file can be made under the root.
     pub(crate) fn takes_files(&self) -> bool {
-        let path = self
-            .root
-            .join(format!("{}.{}", self.name, crate::doors::process::id()));
-        let is_made = private().create(true).truncate(false).open(&path).is_ok();
-        let _ = fs::remove_file(&path);
-        is_made
+        // one that stays, since nobody could remove it, is a lock file that nobody holds to the next sweep
+        let file = format!("{}-{}.lock", self.name, crate::doors::process::id());
+        let path = self.root.join(file);
+        match private().create_new(true).open(&path) {
+            Ok(_) => {
+                let _ = fs::remove_file(&path);
+                true
+            }
+            Err(error) => error.kind() == ErrorKind::AlreadyExists,
+        }
     }
 
     fn lock_error(&self, error: &std::io::Error) -> ProtocolError {
