@@ -4,6 +4,8 @@ use sim_physics::lane::simd::widths;
 
 use crate::camera::Camera;
 use crate::scene::{Scene, Surface};
+use crate::shade::Lights;
+use crate::shadow::Casters;
 use crate::tile::{EDGE, Tile};
 use crate::tree::Waiting;
 use crate::vector::{Frame, Vector, dot, three};
@@ -14,10 +16,13 @@ const SMALL: f32 = 1e-6;
 /// Memory that images need meanwhile: one for each thread.
 #[derive(Default)]
 pub struct Scratch {
+    /// Of all things, in the frame of the camera.
+    frames: Vec<Frame>,
     things: Vec<Seen>,
     order: Vec<u32>,
     /// Of each tile, things from the nearest to the farthest.
     tiles: Vec<Vec<u32>>,
+    casters: Casters,
     waiting: Waiting,
 }
 
@@ -32,13 +37,15 @@ struct Seen {
     tiles: [[usize; 2]; 2],
 }
 
-/// Where an image goes. `(height, width)` each
+/// Where an image goes, row by row. `(height, width)` each, if not said otherwise
 #[derive(Debug)]
 pub struct Image<'a> {
     /// Depth along the camera's z [m]; 0 where nothing is seen.
     pub depth: &'a mut [f32],
     /// Labels of parts, [`crate::NOTHING`] where none is seen.
     pub labels: Option<&'a mut [i32]>,
+    /// Red, green and blue, as a screen shows them. `(height, width, 3)`
+    pub rgb: Option<&'a mut [u8]>,
 }
 
 /// What draws images on this processor.
@@ -93,7 +100,8 @@ impl Scratch {
                 && image
                     .labels
                     .as_ref()
-                    .is_none_or(|labels| labels.len() == pixels),
+                    .is_none_or(|labels| labels.len() == pixels)
+                && image.rgb.as_ref().is_none_or(|rgb| rgb.len() == 3 * pixels),
             "an image of another size than its camera's"
         );
         assert!(camera.is_valid(), "{camera:?}");
@@ -103,9 +111,13 @@ impl Scratch {
         let across = camera.width.div_ceil(EDGE);
         let down = camera.height.div_ceil(EDGE);
         self.place(scene, bodies, eye, camera, [across, down]);
+        let lights = image.rgb.is_some().then(|| Lights::new(scene, eye));
+        if let Some(lights) = lights.as_ref().filter(|_| scene.light.shadows) {
+            self.casters.place(scene, &self.frames, &lights.key);
+        }
         for row in 0..down {
             for column in 0..across {
-                self.tile(scene, camera, [column, row], image);
+                self.tile(scene, camera, lights.as_ref(), [column, row], image);
             }
         }
     }
@@ -121,12 +133,14 @@ impl Scratch {
         tiles: [usize; 2],
     ) {
         self.things.clear();
+        self.frames.clear();
         for (number, thing) in scene.things.iter().enumerate() {
             let in_world = match thing.body {
                 Some(body) => bodies[body].then(&thing.frame),
                 None => thing.frame,
             };
             let frame = eye.relative(&in_world);
+            self.frames.push(frame);
             if let Some((near, tiles)) = extent(&frame, thing.half(), camera, tiles) {
                 self.things.push(Seen {
                     thing: number,
@@ -156,7 +170,14 @@ impl Scratch {
     }
 
     #[inline(always)]
-    fn tile(&mut self, scene: &Scene, camera: &Camera, place: [usize; 2], image: &mut Image<'_>) {
+    fn tile(
+        &mut self,
+        scene: &Scene,
+        camera: &Camera,
+        lights: Option<&Lights>,
+        place: [usize; 2],
+        image: &mut Image<'_>,
+    ) {
         let mut tile = Tile::new(camera, place);
         let across = camera.width.div_ceil(EDGE);
         for &at in &self.tiles[place[1] * across + place[0]] {
@@ -186,6 +207,15 @@ impl Scratch {
                     to[start + lane] =
                         scene.label(tile.things[line][lane], tile.triangles[line][lane]);
                 }
+            }
+        }
+        if let (Some(lights), Some(to)) = (lights, &mut image.rgb) {
+            let (frames, casters) = (&self.frames, &self.casters);
+            let colors = lights.shade(scene, frames, casters, &mut self.waiting, &tile);
+            for line in 0..EDGE.min(height - EDGE * place[1]) {
+                let start = (EDGE * place[1] + line) * width + EDGE * place[0];
+                let pixels = &colors[line][..columns];
+                to[3 * start..3 * (start + columns)].copy_from_slice(pixels.as_flattened());
             }
         }
     }

@@ -1,12 +1,19 @@
 //! Images of cameras in many worlds: rays against the shapes of a model, on the CPU.
 //!
-//! scene (what is seen, per body) → image (tiles, and what each may see) → tree and solids (where rays meet it)
+//! scene (what is seen, per body) → image (tiles, and what each may see) → tree and solids (where rays meet it) → shade (in
+//! what light), with shadows by rays to the light (shadow, parallel)
 //!
 //! An image depends on its world alone: its bits are the same for any number of worlds and threads.
 
 mod camera;
 mod image;
+mod light;
+mod normals;
+mod paint;
+mod parallel;
 mod scene;
+mod shade;
+mod shadow;
 mod solids;
 mod tile;
 mod tree;
@@ -14,5 +21,7 @@ mod vector;
 
 pub use camera::Camera;
 pub use image::{Draw, Image, Scratch, draw};
+pub use light::KeyLight;
+pub use paint::Paint;
 pub use scene::{Look, NOTHING, Part, Scene};
 pub use vector::Frame;

@@ -4,8 +4,11 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use sim_model::Pose;
-use sim_model::geometry::{Shape, TriMesh};
+use sim_model::geometry::vector::{Vector as Point, cross, dot, sub};
+use sim_model::geometry::{HeightField, Shape, TriMesh};
 
+use crate::light::KeyLight;
+use crate::paint::{Coat, Light, Paint};
 use crate::solids::Solid;
 use crate::tree::Tree;
 use crate::vector::{Frame, Vector};
@@ -35,6 +38,8 @@ pub struct Part {
     pub look: Look,
     /// What segmentation calls it.
     pub label: i32,
+    /// Its colours.
+    pub paint: Paint,
 }
 
 /// What is seen at one place: a solid, or the triangles of a body.
@@ -51,37 +56,51 @@ pub(crate) enum Surface {
     Solid {
         solid: Solid,
         label: i32,
+        coat: Coat,
     },
-    /// Triangles, each with its label.
+    /// Triangles, each with its label and its face.
     Triangles {
         tree: Tree,
         labels: Vec<i32>,
+        faces: Vec<Face>,
+        /// Light that faces reflect.
+        tones: Vec<Light>,
     },
 }
 
-/// Parts of all bodies, those of triangles joined per body.
+/// What light falls on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Face {
+    /// Length 1.
+    pub(crate) normal: Vector,
+    pub(crate) tone: u32,
+}
+
+/// Parts of all bodies, those of triangles joined per body, and the light on them.
 #[derive(Debug)]
 pub struct Scene {
     pub(crate) things: Vec<Thing>,
+    pub(crate) light: KeyLight,
     bodies: usize,
 }
 
 impl Scene {
-    /// The scene of these parts.
+    /// The scene of these parts, in the light of films. Those whose [`Paint`] is transparent are left out.
     pub fn new(parts: &[Part]) -> Scene {
         let mut things = Vec::new();
         let mut meshes: Vec<Joined> = Vec::new();
-        for part in parts {
-            match seen(&part.look) {
-                Seen::Solid(solid) => things.push(Thing {
+        for part in parts.iter().filter(|part| part.paint.is_seen()) {
+            match seen(part) {
+                Seen::Solid(solid, coat) => things.push(Thing {
                     body: part.body,
                     frame: frame(&part.pose),
                     surface: Surface::Solid {
                         solid,
                         label: part.label,
+                        coat,
                     },
                 }),
-                Seen::Triangles(mesh) => {
+                Seen::Triangles(mesh, field) => {
                     let joined = meshes.iter().position(|other| other.body == part.body);
                     let joined = joined.unwrap_or_else(|| {
                         meshes.push(Joined {
@@ -90,7 +109,7 @@ impl Scene {
                         });
                         meshes.len() - 1
                     });
-                    meshes[joined].add(&mesh, &part.pose, part.label);
+                    meshes[joined].add(&mesh, field, part);
                 }
             }
         }
@@ -100,7 +119,16 @@ impl Scene {
             .filter_map(|part| part.body)
             .max()
             .map_or(0, |last| last + 1);
-        Scene { things, bodies }
+        Scene {
+            things,
+            light: KeyLight::default(),
+            bodies,
+        }
+    }
+
+    /// The same scene in another light.
+    pub fn lit_by(self, light: KeyLight) -> Scene {
+        Scene { light, ..self }
     }
 
     /// The label of what a pixel sees.
@@ -123,19 +151,30 @@ impl Scene {
 #[derive(Default)]
 struct Joined {
     body: Option<usize>,
-    triangles: Vec<[[f64; 3]; 3]>,
+    triangles: Vec<[Point; 3]>,
     labels: Vec<i32>,
+    tones: Vec<Light>,
+    /// Of each triangle, its tone.
+    chosen: Vec<u32>,
 }
 
 impl Joined {
-    fn add(&mut self, mesh: &TriMesh, pose: &Pose, label: i32) {
-        let corners = mesh
-            .triangles
-            .iter()
-            .map(|&triangle| mesh.corners(triangle));
-        self.triangles
-            .extend(corners.map(|corners| corners.map(|corner| pose.transform(corner))));
-        self.labels.resize(self.triangles.len(), label);
+    fn add(&mut self, mesh: &TriMesh, field: Option<&HeightField>, part: &Part) {
+        let plain = part.paint.light(1.0);
+        for &triangle in &mesh.triangles {
+            let corners = mesh.corners(triangle);
+            let tone = field.map_or(plain, |field| part.paint.on_field(field, &corners));
+            self.triangles
+                .push(corners.map(|corner| part.pose.transform(corner)));
+            let same = |other: &Light| other.map(f32::to_bits) == tone.map(f32::to_bits);
+            // a part has few tones: those of this one are the last
+            let place = self.tones.iter().rposition(same).unwrap_or_else(|| {
+                self.tones.push(tone);
+                self.tones.len() - 1
+            });
+            self.chosen.push(place as u32);
+        }
+        self.labels.resize(self.triangles.len(), part.label);
     }
 
     fn thing(self) -> Thing {
@@ -144,15 +183,30 @@ impl Joined {
             pos: center,
             ..Frame::IDENTITY
         };
+        let faces = self.triangles.iter().zip(&self.chosen);
         Thing {
             body: self.body,
             frame,
             surface: Surface::Triangles {
                 tree,
                 labels: self.labels,
+                faces: faces
+                    .map(|(corners, &tone)| Face {
+                        normal: normal(corners),
+                        tone,
+                    })
+                    .collect(),
+                tones: self.tones,
             },
         }
     }
+}
+
+/// The normal of a triangle [–]; not a number where it has no area, and is not seen.
+fn normal([a, b, c]: &[Point; 3]) -> Vector {
+    let normal = cross(sub(*b, *a), sub(*c, *a));
+    let length = dot(normal, normal).sqrt();
+    normal.map(|part| (part / length) as f32)
 }
 
 impl Thing {
@@ -166,17 +220,20 @@ impl Thing {
 }
 
 enum Seen<'a> {
-    Solid(Solid),
-    Triangles(Cow<'a, TriMesh>),
+    Solid(Solid, Coat),
+    /// Of a height field, too.
+    Triangles(Cow<'a, TriMesh>, Option<&'a HeightField>),
 }
 
-fn seen(look: &Look) -> Seen<'_> {
+fn seen(part: &Part) -> Seen<'_> {
     let single = |x: f64| x as f32;
-    Seen::Solid(match look {
-        Look::Triangles(mesh) => return Seen::Triangles(Cow::Borrowed(mesh)),
-        Look::Sheet(half) => Solid::Plane(half.map(single)),
+    let plane =
+        |half: [f64; 2]| Seen::Solid(Solid::Plane(half.map(single)), part.paint.on_plane(half));
+    let solid = match &part.look {
+        Look::Triangles(mesh) => return Seen::Triangles(Cow::Borrowed(mesh), None),
+        Look::Sheet(half) => return plane(*half),
         Look::Shape(shape) => match shape {
-            Shape::Plane => Solid::Plane([f32::INFINITY; 2]),
+            Shape::Plane => return plane([f64::INFINITY; 2]),
             Shape::Box { half_extents } => Solid::Box(half_extents.map(single)),
             Shape::Sphere { radius } => Solid::Ellipsoid([single(*radius); 3]),
             Shape::Ellipsoid { radii } => Solid::Ellipsoid(radii.map(single)),
@@ -188,10 +245,13 @@ fn seen(look: &Look) -> Seen<'_> {
                 radius,
                 half_height,
             } => Solid::Capsule(single(*radius), single(*half_height)),
-            Shape::Mesh(mesh) => return Seen::Triangles(Cow::Borrowed(&mesh.triangles)),
-            Shape::HeightField(field) => return Seen::Triangles(Cow::Owned(field.surface())),
+            Shape::Mesh(mesh) => return Seen::Triangles(Cow::Borrowed(&mesh.triangles), None),
+            Shape::HeightField(field) => {
+                return Seen::Triangles(Cow::Owned(field.surface()), Some(&**field));
+            }
         },
-    })
+    };
+    Seen::Solid(solid, part.paint.on_solid())
 }
 
 fn frame(pose: &Pose) -> Frame {

@@ -57,6 +57,13 @@ impl Tile {
         a.max(b).max(c.max(d))
     }
 
+    /// Directions of the rays of a line.
+    #[inline(always)]
+    pub(crate) fn rays(&self, line: usize) -> [F32x8; 3] {
+        let y = F32x8::k(self.y[line]);
+        [F32x8::load(&self.x), y, F32x8::k(1.0)]
+    }
+
     /// Directions of the rays of a line, in the frame of a thing.
     #[inline(always)]
     pub(crate) fn directions(&self, frame: &Frame, line: usize) -> [F32x8; 3] {

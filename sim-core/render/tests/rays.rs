@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fastrand::Rng;
 use sim_model::Pose;
 use sim_model::geometry::{RayShape, Shape, TriMesh, TriangleTree, triangles};
-use sim_render::{Camera, Frame, Image, Look, NOTHING, Part, Scene, Scratch, draw};
+use sim_render::{Camera, Frame, Image, Look, NOTHING, Paint, Part, Scene, Scratch, draw};
 
 /// Distances of surfaces along a ray from which on the nearer one is certain [m].
 const CLOSE: f64 = 1e-4;
@@ -100,6 +100,7 @@ fn part(rng: &mut Rng, label: i32) -> Seen {
         pose: pose(rng, 0.2),
         look,
         label,
+        paint: Paint::PLAIN,
     };
     Seen { part, ray, body }
 }
@@ -119,6 +120,7 @@ fn seen_from_the_origin(parts: &[Part], camera: &Camera) -> (Vec<f32>, Vec<i32>)
     let mut image = Image {
         depth: &mut depth,
         labels: Some(&mut labels),
+        rgb: None,
     };
     if let Some(draw) = draw() {
         let scratch = &mut Scratch::default();
@@ -138,6 +140,7 @@ fn a_solid_is_seen_from_outside_between_near_and_far_and_a_plane_from_above() {
         pose,
         look: Look::Shape(shape),
         label,
+        paint: Paint::PLAIN,
     };
     let ball = |radius, z, label| fixed(Shape::Sphere { radius }, Pose::at([0.0, 0.0, z]), label);
     let turned = Pose::from_rpy([0.0, 0.0, 4.0], [std::f64::consts::PI, 0.0, 0.0]);
@@ -210,12 +213,14 @@ fn depths_and_labels_are_those_of_rays_in_double_precision() {
         let mut image = Image {
             depth: &mut depth,
             labels: Some(&mut labels),
+            rgb: None,
         };
         draw(&scene, &bodies, &frame(&eye), &camera, scratch, &mut image);
         let mut again = vec![f32::NAN; depth.len()];
         let mut image = Image {
             depth: &mut again,
             labels: None,
+            rgb: None,
         };
         let fresh = &mut Scratch::default();
         draw(&scene, &bodies, &frame(&eye), &camera, fresh, &mut image);

@@ -55,6 +55,27 @@ impl Tree {
         near: f32,
         limit: f32,
     ) -> Option<Met> {
+        self.walk::<false>(stack, from, direction, near, limit)
+    }
+
+    /// Whether a ray meets any triangle from its front beyond 0.
+    #[inline(always)]
+    pub(super) fn stops(&self, stack: &mut Stack, from: &Origin, direction: Vector) -> bool {
+        let endless = f32::INFINITY;
+        self.walk::<true>(stack, from, direction, 0.0, endless)
+            .is_some()
+    }
+
+    /// What a ray meets first; with `ANY`, the first that is come upon.
+    #[inline(always)]
+    fn walk<const ANY: bool>(
+        &self,
+        stack: &mut Stack,
+        from: &Origin,
+        direction: Vector,
+        near: f32,
+        limit: f32,
+    ) -> Option<Met> {
         if self.nodes.is_empty() {
             return None;
         }
@@ -90,6 +111,9 @@ impl Tree {
                         nearest = far[lane];
                         met = Some((at & !LEAF, lane));
                     }
+                }
+                if ANY && met.is_some() {
+                    waiting = 0;
                 }
             }
             loop {

@@ -25,7 +25,7 @@ const LEAVES_MAX: usize = 64;
 /// Memory for what waits on the way down.
 #[derive(Default)]
 pub(crate) struct Waiting {
-    stack: Stack,
+    pub(super) stack: Stack,
     /// Leaves with their least depths.
     leaves: Vec<(f32, u32)>,
 }
@@ -177,7 +177,7 @@ impl Bundle {
 
 /// The largest products of a vector and the corners of boxes; with the sign -1, the smallest.
 #[inline(always)]
-fn corner(node: &Node, v: Vector, sign: f32) -> F32x8 {
+pub(super) fn corner(node: &Node, v: Vector, sign: f32) -> F32x8 {
     let bounds = |k: usize| {
         if sign * v[k] < 0.0 {
             &node.low[k]
@@ -263,7 +263,7 @@ impl Leaf {
 
 /// Vectors of a frame in its parent's.
 #[inline(always)]
-fn turned(frame: &Frame, v: &[F32x8; 3], to: &mut [[f32; 8]; 3]) {
+pub(super) fn turned(frame: &Frame, v: &[F32x8; 3], to: &mut [[f32; 8]; 3]) {
     for k in 0..3 {
         let row = frame.rot[k];
         v[2].fma(

@@ -14,6 +14,7 @@
 mod build;
 mod cast;
 mod fill;
+mod shade;
 
 pub(crate) use fill::Waiting;
 

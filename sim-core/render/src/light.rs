@@ -1,0 +1,100 @@
+//! Light that falls on a scene: a key light from far off, which may cast shadows, a fill light from the camera's side, and a
+//! sky, as in our pictures and films.
+//!
+//! ```text
+//! light = colour (0.22 + 0.24 (1 + n·z)/2 + 0.66 max(n·k, 0) s + 0.14 max(n·f, 0)) + 0.1 max(n·h, 0)³² s
+//! ```
+//!
+//! n is the normal, z up in the world, k and f where key and fill light come from, h the middle between k and the eye. s is 1
+//! where the key light arrives, else 0.
+
+use sim_model::geometry::vector::{Vector as Point, cross, dot};
+
+use crate::paint::{Light, light_of};
+use crate::vector::Frame;
+
+/// Where the key light comes from, in the world.
+const KEY: [f64; 3] = [0.33, -0.52, 0.79];
+/// Where the fill light comes from, in the frame of a camera, with length 1.
+pub(crate) const FILL: [f32; 3] = [0.751_882_06, -0.100_250_94, -0.651_631_1];
+/// What all surfaces reflect of light from everywhere, and more of it the more they look up [–].
+pub(crate) const AMBIENT: f32 = 0.22;
+pub(crate) const UPWARD: f32 = 0.24;
+/// Of the key light and the fill light, where they fall straight on a surface [–].
+pub(crate) const BRIGHT: f32 = 0.66;
+pub(crate) const FILLED: f32 = 0.14;
+/// Light of a highlight, whatever the colour [–].
+pub(crate) const GLEAM: f32 = 0.10;
+/// Behind everything: at the horizon and below, and from this sine of the elevation on.
+pub(crate) const HORIZON: Light = light_of([226, 230, 236]);
+pub(crate) const SKY: Light = light_of([250, 251, 253]);
+pub(crate) const HIGH: f32 = 0.6;
+
+fn norm(v: Point) -> f64 {
+    dot(v, v).sqrt()
+}
+
+/// The key light of a scene: from far off, white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyLight {
+    /// Its frame in the world: z points to where it comes from.
+    pub(crate) axes: Frame,
+    /// Whether it casts shadows.
+    pub shadows: bool,
+}
+
+impl KeyLight {
+    /// Light that comes from this direction in the world, of any length, and casts shadows; none if it is no direction.
+    pub fn from_direction(towards: [f64; 3]) -> Option<KeyLight> {
+        let length = norm(towards);
+        if !(length > 0.0 && length.is_finite()) {
+            return None;
+        }
+        let key = towards.map(|part| part / length);
+        let side = match cross([0.0, 0.0, 1.0], key) {
+            // straight from above, or from below
+            side if dot(side, side) < 1e-12 => [1.0, 0.0, 0.0],
+            side => side.map(|part| part / norm(side)),
+        };
+        let columns = [side, cross(key, side), key];
+        Some(KeyLight {
+            axes: Frame {
+                pos: [0.0; 3],
+                rot: [0, 1, 2].map(|k| columns.map(|column| column[k] as f32)),
+            },
+            shadows: true,
+        })
+    }
+}
+
+impl Default for KeyLight {
+    /// That of films: from behind the left shoulder of who looks along y.
+    fn default() -> KeyLight {
+        KeyLight::from_direction(KEY).unwrap_or(KeyLight {
+            axes: Frame::IDENTITY,
+            shadows: true,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_light_has_right_handed_axes_and_comes_from_somewhere() {
+        for towards in [KEY, [0.0, 0.0, 2.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]] {
+            let rot = KeyLight::from_direction(towards).unwrap().axes.rot;
+            let column = |k: usize| rot.map(|row| f64::from(row[k]));
+            let third = cross(column(0), column(1));
+            for k in 0..3 {
+                assert!((third[k] - towards[k] / norm(towards)).abs() < 1e-6);
+                assert!((norm(column(k)) - 1.0).abs() < 1e-6);
+            }
+        }
+        assert!(KeyLight::from_direction([0.0; 3]).is_none());
+        assert!(KeyLight::from_direction([f64::NAN, 0.0, 1.0]).is_none());
+        let fill = FILL.map(f64::from);
+        assert!((norm(fill) - 1.0).abs() < 1e-6);
+    }
+}

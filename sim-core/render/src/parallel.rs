@@ -1,0 +1,152 @@
+//! Where parallel rays enter shapes: those to a light from far off.
+//!
+//! As `solids`, with one direction of length 1 and eight places. Only whether a ray enters counts.
+
+use sim_physics::lane::simd::F32x8;
+use sim_physics::lane::{Lane, Num};
+
+use crate::shadow::Lit;
+use crate::solids::Solid;
+use crate::tile::EDGE;
+use crate::vector::{Frame, Vector, dot, three};
+
+type Mask = <F32x8 as Num>::Mask;
+type Points = [F32x8; 3];
+
+/// A square of the sine of an angle below which a ray is along an axis [–].
+const ALONG: f32 = 1e-12;
+
+impl Solid {
+    /// Shades the points of a tile that it is in the way of; `frame` is its own in that of the light.
+    #[inline(always)]
+    pub(crate) fn shade(&self, frame: &Frame, lit: &mut Lit) {
+        // to the light, in the frame of the solid
+        let d = frame.rot[2];
+        let start = frame.turn_back(three!(k => -frame.pos[k]));
+        for line in 0..EDGE {
+            let c = F32x8::load(&lit.c[line]);
+            let is_lit = c.lt(F32x8::k(f32::INFINITY));
+            if !F32x8::any(is_lit) {
+                continue;
+            }
+            let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
+            let c = F32x8::select(is_lit, c, F32x8::k(0.0));
+            let o = three!(k => {
+                let rest = a.fma(F32x8::k(frame.rot[0][k]), F32x8::k(start[k]));
+                c.fma(F32x8::k(frame.rot[2][k]), b.fma(F32x8::k(frame.rot[1][k]), rest))
+            });
+            lit.shade(line, is_lit & self.stops(&o, d));
+        }
+    }
+
+    /// Which rays from `o` along `d` enter it from outside.
+    #[inline(always)]
+    fn stops(&self, o: &Points, d: Vector) -> Mask {
+        match *self {
+            Solid::Plane(half) => plane(half, o, d),
+            Solid::Box(half) => sides(half, o, d),
+            Solid::Ellipsoid(axes) => {
+                let d = three!(k => d[k] / axes[k]);
+                sphere(1.0, &three!(k => o[k] * F32x8::k(1.0 / axes[k])), d)
+            }
+            Solid::Cylinder(radius, half) => cylinder(radius, half, o, d),
+            Solid::Capsule(radius, half) => {
+                let (t, height) = tube(radius, o, d);
+                let zero = F32x8::k(0.0);
+                let is_side = zero.lt(t) & height.abs().lt(F32x8::k(half));
+                let is_outside = !capsule_holds(radius, half, o);
+                let low = sphere(radius, &[o[0], o[1], o[2] + F32x8::k(half)], d);
+                let high = sphere(radius, &[o[0], o[1], o[2] - F32x8::k(half)], d);
+                is_outside & (is_side | low | high)
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn plane(half: [f32; 2], o: &Points, d: Vector) -> Mask {
+    let zero = F32x8::k(0.0);
+    let t = -o[2] * F32x8::k(1.0 / d[2]);
+    let (x, y) = (t.fma(F32x8::k(d[0]), o[0]), t.fma(F32x8::k(d[1]), o[1]));
+    let is_within = !F32x8::k(half[0]).lt(x.abs()) & !F32x8::k(half[1]).lt(y.abs());
+    // casters are planes whose front the rays meet
+    zero.lt(o[2]) & is_within
+}
+
+#[inline(always)]
+fn sides(half: Vector, o: &Points, d: Vector) -> Mask {
+    let (mut enter, mut leave) = (F32x8::k(f32::NEG_INFINITY), F32x8::k(f32::INFINITY));
+    for k in 0..3 {
+        // along a side, far away and not at a NaN
+        let along = if d[k].abs() < 1e-18 { 1e-18 } else { d[k] };
+        let (inverse, width) = (F32x8::k(1.0 / along), F32x8::k((half[k] / along).abs()));
+        let middle = -o[k] * inverse;
+        enter = (middle - width).max(enter);
+        leave = (middle + width).min(leave);
+    }
+    enter.lt(leave) & F32x8::k(0.0).lt(enter)
+}
+
+/// Which rays enter a sphere from outside.
+#[inline(always)]
+fn sphere(radius: f32, o: &Points, d: Vector) -> Mask {
+    let a = dot(d, d);
+    let nearest = products(o, d) * F32x8::k(-1.0 / a);
+    let f = three!(k => nearest.fma(F32x8::k(d[k]), o[k]));
+    let inside = F32x8::k(radius * radius) - squares(&f);
+    let zero = F32x8::k(0.0);
+    let t = nearest - (inside.max(zero) * F32x8::k(1.0 / a)).sqrt();
+    zero.lt(inside) & zero.lt(t)
+}
+
+/// Where rays enter a cylinder without ends, below 0 where they do not, and how high.
+#[inline(always)]
+fn tube(radius: f32, o: &Points, d: Vector) -> (F32x8, F32x8) {
+    let (zero, nowhere) = (F32x8::k(0.0), F32x8::k(-1.0));
+    let a = d[1].mul_add(d[1], d[0] * d[0]);
+    if a < ALONG {
+        return (nowhere, zero);
+    }
+    let b = o[1].fma(F32x8::k(d[1]), o[0] * F32x8::k(d[0]));
+    let nearest = b * F32x8::k(-1.0 / a);
+    let x = nearest.fma(F32x8::k(d[0]), o[0]);
+    let y = nearest.fma(F32x8::k(d[1]), o[1]);
+    let inside = F32x8::k(radius * radius) - y.fma(y, x * x);
+    let t = nearest - (inside.max(zero) * F32x8::k(1.0 / a)).sqrt();
+    let t = F32x8::select(zero.lt(inside), t, nowhere);
+    (t, t.fma(F32x8::k(d[2]), o[2]))
+}
+
+#[inline(always)]
+fn cylinder(radius: f32, half: f32, o: &Points, d: Vector) -> Mask {
+    let zero = F32x8::k(0.0);
+    let (t, height) = tube(radius, o, d);
+    let mut is_met = zero.lt(t) & height.abs().lt(F32x8::k(half));
+    if d[2] * d[2] > ALONG {
+        // the end that faces the rays
+        let t = (F32x8::k(-half.copysign(d[2])) - o[2]) * F32x8::k(1.0 / d[2]);
+        let (x, y) = (t.fma(F32x8::k(d[0]), o[0]), t.fma(F32x8::k(d[1]), o[1]));
+        is_met = is_met | zero.lt(t) & !F32x8::k(radius * radius).lt(y.fma(y, x * x));
+    }
+    is_met
+}
+
+/// Which points are inside.
+#[inline(always)]
+fn capsule_holds(radius: f32, half: f32, o: &Points) -> Mask {
+    let z = o[2] - o[2].max(F32x8::k(-half)).min(F32x8::k(half));
+    squares(&[o[0], o[1], z]).lt(F32x8::k(radius * radius))
+}
+
+#[inline(always)]
+fn products(a: &Points, b: Vector) -> F32x8 {
+    a[2].fma(
+        F32x8::k(b[2]),
+        a[1].fma(F32x8::k(b[1]), a[0] * F32x8::k(b[0])),
+    )
+}
+
+#[inline(always)]
+fn squares(a: &Points) -> F32x8 {
+    a[2].fma(a[2], a[1].fma(a[1], a[0] * a[0]))
+}

@@ -1,0 +1,200 @@
+//! Shadows of a tree: parallel rays to a light through it.
+//!
+//! In the frame of the light, (a, b, c), a ray p keeps its a and b. So what a triangle needs of it is linear in these:
+//!
+//! ```text
+//! A = -n·l,  A c = n·(a, b, 0) - h              the ray meets the plane at c
+//! A u = (A ũ + (ũ·l) n)·(a, b, 0) + A u₀ - (ũ·l) h       as A v: the signs tell whether it is inside
+//! ```
+//!
+//! The points of a tile go down the tree together, as what is over a rectangle. Where they meet more leaves than pays, each
+//! goes down by itself.
+
+use sim_physics::lane::simd::F32x8;
+use sim_physics::lane::{Lane, Num};
+
+use super::cast::Origin;
+use super::fill::{Waiting, corner, turned};
+use super::{LEAF, Leaf, Node, Tree};
+use crate::shadow::Lit;
+use crate::tile::EDGE;
+use crate::vector::{Frame, Vector, three};
+
+/// Most leaves that are met triangle by triangle.
+const LEAVES_MAX: usize = 64;
+
+/// What is over a rectangle, as seen from a light: rays inside have products with these directions that are at least so
+/// large, in the frame of a tree.
+struct Beam {
+    sides: [Vector; 5],
+    least: [f32; 5],
+}
+
+impl Tree {
+    /// Shades the points of a tile that its triangles are in the way of; `frame` is its own in that of the light.
+    #[inline(always)]
+    pub(crate) fn shade(&self, frame: &Frame, waiting: &mut Waiting, lit: &mut Lit) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let slack = self
+            .origin_at(frame.turn_back(three!(k => -frame.pos[k])))
+            .slack;
+        let beam = Beam::new(frame, slack, lit);
+        let stack = &mut waiting.stack.0;
+        let (mut count, mut leaves) = (1, 0);
+        stack[0] = (0.0, 0);
+        while count > 0 {
+            count -= 1;
+            let at = stack[count].1;
+            if at & LEAF == 0 {
+                let node = &self.nodes[at as usize];
+                let mut bits = beam.boxes(node);
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize & 7;
+                    bits &= bits - 1;
+                    stack[count] = (0.0, node.children[lane]);
+                    count += 1;
+                }
+            } else if leaves == LEAVES_MAX {
+                return self.shade_by_ray(frame, slack, waiting, lit);
+            } else {
+                leaves += 1;
+                self.leaves[(at & !LEAF) as usize].shade(frame, slack, lit);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn shade_by_ray(&self, frame: &Frame, slack: f32, waiting: &mut Waiting, lit: &mut Lit) {
+        let direction = frame.rot[2];
+        for line in 0..EDGE {
+            for lane in 0..EDGE {
+                if lit.c[line][lane] == f32::INFINITY {
+                    continue;
+                }
+                let place = [lit.a[line][lane], lit.b[line][lane], lit.c[line][lane]];
+                let pos = frame.turn_back(three!(k => place[k] - frame.pos[k]));
+                let from = Origin { pos, slack };
+                if self.stops(&mut waiting.stack, &from, direction) {
+                    lit.c[line][lane] = f32::INFINITY;
+                }
+            }
+        }
+    }
+}
+
+impl Beam {
+    #[inline(always)]
+    fn new(frame: &Frame, slack: f32, lit: &Lit) -> Beam {
+        let [a, b, c] = frame.rot;
+        let sides = [a, three!(k => -a[k]), b, three!(k => -b[k]), c];
+        let [x, y, z] = frame.pos;
+        let least = [
+            lit.low[0] - x,
+            x - lit.high[0],
+            lit.low[1] - y,
+            y - lit.high[1],
+            lit.deep - z,
+        ];
+        Beam {
+            sides,
+            least: crate::vector::each!(k in 0 1 2 3 4 => {
+                least[k] - slack * (sides[k][0].abs() + sides[k][1].abs() + sides[k][2].abs())
+            }),
+        }
+    }
+
+    /// Which boxes of a node are in it.
+    #[inline(always)]
+    fn boxes(&self, node: &Node) -> u32 {
+        // boxes of no child are infinite, so that products with them may be NaN
+        let mut is_in = F32x8::load(&node.low[0]).lt(F32x8::k(f32::INFINITY));
+        for side in 0..5 {
+            let most = corner(node, self.sides[side], 1.0);
+            is_in = is_in & !most.lt(F32x8::k(self.least[side]));
+        }
+        F32x8::bits(is_in)
+    }
+}
+
+/// Numbers of eight triangles in the frame of a light: factors of a, b and 1.
+struct Cast {
+    against: [f32; 8],
+    high: [[f32; 8]; 3],
+    u: [[f32; 8]; 3],
+    v: [[f32; 8]; 3],
+    slack: [f32; 8],
+}
+
+impl Leaf {
+    #[inline(always)]
+    fn shade(&self, frame: &Frame, slack: f32, lit: &mut Lit) {
+        let (cast, mut bits) = self.seen_along(frame, slack);
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let all = |numbers: &[[f32; 8]; 3], k: usize| F32x8::k(numbers[k][lane]);
+            let against = F32x8::k(cast.against[lane]);
+            let slack = F32x8::k(-cast.slack[lane]);
+            let high = [all(&cast.high, 0), all(&cast.high, 1), all(&cast.high, 2)];
+            let u = [all(&cast.u, 0), all(&cast.u, 1), all(&cast.u, 2)];
+            let v = [all(&cast.v, 0), all(&cast.v, 1), all(&cast.v, 2)];
+            for line in 0..EDGE {
+                let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
+                let high = a.fma(high[0], b.fma(high[1], high[2]));
+                let u = a.fma(u[0], b.fma(u[1], u[2]));
+                let v = a.fma(v[0], b.fma(v[1], v[2]));
+                let least = u.min(v).min(against - u - v);
+                let is_met = slack.lt(least) & (F32x8::load(&lit.c[line]) * against).lt(high);
+                if F32x8::any(is_met) {
+                    lit.shade(line, is_met);
+                }
+            }
+        }
+    }
+
+    /// What the triangles need of rays, and which these meet from their front.
+    #[inline(always)]
+    fn seen_along(&self, frame: &Frame, slack: f32) -> (Cast, u32) {
+        let mut cast = Cast {
+            against: [0.0; 8],
+            high: [[0.0; 8]; 3],
+            u: [[0.0; 8]; 3],
+            v: [[0.0; 8]; 3],
+            slack: [0.0; 8],
+        };
+        // the place of the tree, in its own frame
+        let back = frame.turn_back(frame.pos);
+        let normal = three!(k => F32x8::load(&self.normal[k]));
+        turned(frame, &normal, &mut cast.high);
+        let n = three!(k => F32x8::load(&cast.high[k]));
+        let against = -n[2];
+        let height = from_light(&normal, back, F32x8::load(&self.height));
+        (-height).store(&mut cast.high[2]);
+        against.store(&mut cast.against);
+        for axis in 0..2 {
+            let across = three!(k => F32x8::load(&self.across[axis][k]));
+            let start = -from_light(&across, back, -F32x8::load(&self.start[axis]));
+            let to = if axis == 0 { &mut cast.u } else { &mut cast.v };
+            turned(frame, &across, to);
+            let along = F32x8::load(&to[2]);
+            for k in 0..2 {
+                let factor = against.fma(F32x8::load(&to[k]), along * n[k]);
+                factor.store(&mut to[k]);
+            }
+            (against * start - along * height).store(&mut to[2]);
+        }
+        (F32x8::k(slack) * F32x8::load(&self.steep)).store(&mut cast.slack);
+        (cast, F32x8::bits(F32x8::k(0.0).lt(against)))
+    }
+}
+
+/// Products h with points of a frame, as those with the same points in the frame of a light: h + v·x, where `back` is x.
+#[inline(always)]
+fn from_light(v: &[F32x8; 3], back: Vector, height: F32x8) -> F32x8 {
+    v[2].fma(
+        F32x8::k(back[2]),
+        v[1].fma(F32x8::k(back[1]), v[0].fma(F32x8::k(back[0]), height)),
+    )
+}
