@@ -17,8 +17,8 @@ const FIXED: i32 = 1000;
 /// Angles of the first joints [rad].
 const BENT: [f64; 7] = [0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8];
 /// Rounds of all kinds of images; the best counts, since the machine may be busy with others.
-const ROUNDS: usize = 20;
-const ROUND: Duration = Duration::from_millis(25);
+const ROUNDS: usize = 60;
+const ROUND: Duration = Duration::from_millis(6);
 /// Boxes along an edge of a square of them.
 const BOXES: usize = 64;
 /// Samples along an edge of rough ground, and their distance [m].
@@ -146,6 +146,10 @@ const KINDS: [(&str, [bool; 3]); 4] = [
 ];
 
 fn measure(draw: Draw, name: &str, parts: &[Part], bodies: &[Frame], eye: &Frame) {
+    if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
+        return;
+    }
+    let kinds = std::env::var("KINDS").map_or(15, |k| k.parse::<u32>().unwrap());
     let began = Instant::now();
     let scene = Scene::new(parts);
     let built = began.elapsed();
@@ -160,6 +164,12 @@ fn measure(draw: Draw, name: &str, parts: &[Part], bodies: &[Frame], eye: &Frame
     for _ in 0..ROUNDS {
         for (best, (_, [with_labels, with_rgb, with_shadows])) in best.iter_mut().zip(KINDS) {
             let scene = &scenes[usize::from(with_shadows)];
+            let kind = usize::from(with_labels)
+                + 2 * usize::from(with_rgb && !with_shadows)
+                + 3 * usize::from(with_shadows);
+            if kinds >> kind & 1 == 0 {
+                continue;
+            }
             let (began, mut images) = (Instant::now(), 0);
             while began.elapsed() < ROUND {
                 let mut image = Image {

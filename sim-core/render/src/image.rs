@@ -210,7 +210,7 @@ impl Scratch {
             }
         }
         if let (Some(lights), Some(to)) = (lights, &mut image.rgb) {
-            let (frames, casters) = (&self.frames, &self.casters);
+            let (frames, casters) = (&self.frames, &mut self.casters);
             let colors = lights.shade(scene, frames, casters, &mut self.waiting, &tile);
             for line in 0..EDGE.min(height - EDGE * place[1]) {
                 let start = (EDGE * place[1] + line) * width + EDGE * place[0];

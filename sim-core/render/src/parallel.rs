@@ -2,13 +2,11 @@
 //!
 //! As `solids`, with one direction of length 1 and eight places. Only whether a ray enters counts.
 
+use sim_physics::lane::Num;
 use sim_physics::lane::simd::F32x8;
-use sim_physics::lane::{Lane, Num};
 
-use crate::shadow::Lit;
 use crate::solids::Solid;
-use crate::tile::EDGE;
-use crate::vector::{Frame, Vector, dot, three};
+use crate::vector::{Vector, dot, three};
 
 type Mask = <F32x8 as Num>::Mask;
 type Points = [F32x8; 3];
@@ -17,31 +15,9 @@ type Points = [F32x8; 3];
 const ALONG: f32 = 1e-12;
 
 impl Solid {
-    /// Shades the points of a tile that it is in the way of; `frame` is its own in that of the light.
-    #[inline(always)]
-    pub(crate) fn shade(&self, frame: &Frame, lit: &mut Lit) {
-        // to the light, in the frame of the solid
-        let d = frame.rot[2];
-        let start = frame.turn_back(three!(k => -frame.pos[k]));
-        for line in 0..EDGE {
-            let c = F32x8::load(&lit.c[line]);
-            let is_lit = c.lt(F32x8::k(f32::INFINITY));
-            if !F32x8::any(is_lit) {
-                continue;
-            }
-            let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
-            let c = F32x8::select(is_lit, c, F32x8::k(0.0));
-            let o = three!(k => {
-                let rest = a.fma(F32x8::k(frame.rot[0][k]), F32x8::k(start[k]));
-                c.fma(F32x8::k(frame.rot[2][k]), b.fma(F32x8::k(frame.rot[1][k]), rest))
-            });
-            lit.shade(line, is_lit & self.stops(&o, d));
-        }
-    }
-
     /// Which rays from `o` along `d` enter it from outside.
     #[inline(always)]
-    fn stops(&self, o: &Points, d: Vector) -> Mask {
+    pub(crate) fn stops(&self, o: &Points, d: Vector) -> Mask {
         match *self {
             Solid::Plane(half) => plane(half, o, d),
             Solid::Box(half) => sides(half, o, d),

@@ -52,7 +52,7 @@ impl Lights {
         &self,
         scene: &Scene,
         frames: &[Frame],
-        casters: &Casters,
+        casters: &mut Casters,
         waiting: &mut Waiting,
         tile: &Tile,
     ) -> [[[u8; 3]; EDGE]; EDGE] {

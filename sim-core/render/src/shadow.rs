@@ -9,6 +9,7 @@
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
+use crate::normals::turned_back;
 use crate::scene::{Scene, Surface};
 use crate::solids::Solid;
 use crate::tile::EDGE;
@@ -109,6 +110,148 @@ struct Caster {
 #[derive(Default)]
 pub(crate) struct Casters {
     all: Vec<Caster>,
+    /// Which points of each line are below the box of a caster: bits.
+    below: [u32; EDGE],
+    few: Few,
+}
+
+impl Caster {
+    /// Which points of a line are below it, or rather below the rectangle around it.
+    #[inline(always)]
+    fn is_over(&self, lit: &Lit, line: usize) -> <F32x8 as Num>::Mask {
+        let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
+        F32x8::k(self.low[0]).lt(a)
+            & a.lt(F32x8::k(self.high[0]))
+            & F32x8::k(self.low[1]).lt(b)
+            & b.lt(F32x8::k(self.high[1]))
+            & F32x8::load(&lit.c[line]).lt(F32x8::k(self.top))
+    }
+
+    /// Shades the points of a line below a solid; of triangles, tells which rays meet the box around them.
+    #[inline(always)]
+    fn stops(
+        &self,
+        scene: &Scene,
+        lit: &mut Lit,
+        line: usize,
+        is_below: <F32x8 as Num>::Mask,
+    ) -> u32 {
+        let (frame, [a, b]) = (
+            &self.frame,
+            [&lit.a, &lit.b].map(|all| F32x8::load(&all[line])),
+        );
+        let c = F32x8::select(is_below, F32x8::load(&lit.c[line]), F32x8::k(0.0));
+        let from = [
+            a - F32x8::k(frame.pos[0]),
+            b - F32x8::k(frame.pos[1]),
+            c - F32x8::k(frame.pos[2]),
+        ];
+        let o = turned_back(frame, &from);
+        match &scene.things[self.thing].surface {
+            Surface::Solid { solid, .. } => {
+                lit.shade(line, is_below & solid.stops(&o, frame.rot[2]));
+                0
+            }
+            Surface::Triangles { tree, .. } => {
+                F32x8::bits(is_below & is_within(tree.half, &o, frame.rot[2]))
+            }
+        }
+    }
+}
+
+/// Points that a tree may shade, close together.
+pub(crate) struct Few {
+    pub(crate) count: usize,
+    /// Coordinates as those of [`Lit`], of groups of eight; what is behind the last point has an infinite c.
+    pub(crate) groups: [[[f32; EDGE]; 3]; EDGE],
+    /// Least and largest a and b of each group, and of all.
+    pub(crate) bounds: [[[f32; 2]; 2]; EDGE],
+    pub(crate) all: [[f32; 2]; 2],
+    pub(crate) deep: f32,
+    /// Where the points are in the tile.
+    places: [u8; EDGE * EDGE],
+}
+
+impl Default for Few {
+    fn default() -> Few {
+        Few {
+            count: 0,
+            groups: [[[0.0; EDGE]; 3]; EDGE],
+            bounds: [[[0.0; 2]; 2]; EDGE],
+            all: [[0.0; 2]; 2],
+            deep: 0.0,
+            places: [0; EDGE * EDGE],
+        }
+    }
+}
+
+impl Few {
+    /// Groups in use.
+    #[inline(always)]
+    pub(crate) fn in_use(&self) -> usize {
+        self.count.div_ceil(EDGE)
+    }
+
+    #[inline(always)]
+    fn gather(&mut self, lit: &Lit, chosen: &[u32; EDGE]) {
+        let endless = [f32::INFINITY, f32::NEG_INFINITY];
+        (self.count, self.all, self.deep) = (0, [endless; 2], f32::INFINITY);
+        for line in 0..EDGE {
+            let mut bits = chosen[line];
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & (EDGE - 1);
+                bits &= bits - 1;
+                let point = [lit.a[line][lane], lit.b[line][lane], lit.c[line][lane]];
+                let (group, place) = (self.count / EDGE % EDGE, self.count % EDGE);
+                if place == 0 {
+                    self.groups[group][2] = [f32::INFINITY; EDGE];
+                    self.bounds[group] = [endless; 2];
+                }
+                for k in 0..3 {
+                    self.groups[group][k][place] = point[k];
+                }
+                for k in 0..2 {
+                    let [low, high] = self.bounds[group][k];
+                    self.bounds[group][k] = [low.min(point[k]), high.max(point[k])];
+                }
+                self.deep = self.deep.min(point[2]);
+                self.places[self.count % (EDGE * EDGE)] = (EDGE * line + lane) as u8;
+                self.count += 1;
+            }
+        }
+        for group in 0..self.in_use() {
+            for k in 0..2 {
+                let ([low, high], [least, most]) = (self.all[k], self.bounds[group][k]);
+                self.all[k] = [low.min(least), high.max(most)];
+            }
+        }
+    }
+
+    /// Marks those that are shaded now.
+    #[inline(always)]
+    fn scatter(&self, lit: &mut Lit) {
+        for point in 0..self.count {
+            let place = usize::from(self.places[point % (EDGE * EDGE)]);
+            let c = self.groups[point / EDGE % EDGE][2][point % EDGE];
+            lit.c[place / EDGE % EDGE][place % EDGE] = c;
+        }
+    }
+}
+
+/// Which rays from `o` along `d` meet a box, from inside too.
+#[inline(always)]
+fn is_within(half: Vector, o: &[F32x8; 3], d: Vector) -> <F32x8 as Num>::Mask {
+    let (mut enter, mut leave) = (F32x8::k(0.0), F32x8::k(f32::INFINITY));
+    for k in 0..3 {
+        let along = if d[k].abs() < 1e-18 { 1e-18 } else { d[k] };
+        let (inverse, width) = (1.0 / along, (half[k] / along).abs());
+        // more than the rounding
+        let middle = -o[k] * F32x8::k(inverse);
+        let width = middle.abs().fma(F32x8::k(1e-6), F32x8::k(1.000_01 * width));
+        enter = (middle - width).max(enter);
+        leave = (middle + width).min(leave);
+    }
+    !leave.lt(enter)
 }
 
 impl Casters {
@@ -143,7 +286,7 @@ impl Casters {
 
     /// Shades the points of a tile.
     #[inline(always)]
-    pub(crate) fn shade(&self, scene: &Scene, waiting: &mut Waiting, lit: &mut Lit) {
+    pub(crate) fn shade(&mut self, scene: &Scene, waiting: &mut Waiting, lit: &mut Lit) {
         if !lit.bound() {
             return;
         }
@@ -156,9 +299,19 @@ impl Casters {
             if is_beside {
                 continue;
             }
-            match &scene.things[caster.thing].surface {
-                Surface::Solid { solid, .. } => solid.shade(&caster.frame, lit),
-                Surface::Triangles { tree, .. } => tree.shade(&caster.frame, waiting, lit),
+            for line in 0..EDGE {
+                let is_below = caster.is_over(lit, line);
+                self.below[line] = match F32x8::any(is_below) {
+                    true => caster.stops(scene, lit, line, is_below),
+                    false => 0,
+                }
+            }
+            if let Surface::Triangles { tree, .. } = &scene.things[caster.thing].surface {
+                self.few.gather(lit, &self.below);
+                if self.few.count > 0 {
+                    tree.shade(&caster.frame, waiting, &mut self.few);
+                    self.few.scatter(lit);
+                }
             }
         }
     }

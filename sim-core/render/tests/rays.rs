@@ -1,113 +1,17 @@
 //! Depths and labels of random scenes beside rays in `f64`, which are tested against MuJoCo's.
 
-use std::sync::Arc;
+mod random;
 
 use fastrand::Rng;
+use random::{Seen, frame, part, rotation};
 use sim_model::Pose;
-use sim_model::geometry::{RayShape, Shape, TriMesh, TriangleTree, triangles};
+use sim_model::geometry::Shape;
 use sim_render::{Camera, Frame, Image, Look, NOTHING, Paint, Part, Scene, Scratch, draw};
 
 /// Distances of surfaces along a ray from which on the nearer one is certain [m].
 const CLOSE: f64 = 1e-4;
 /// Largest error of a depth [m].
 const PRECISE: f64 = 1e-5;
-
-struct Seen {
-    part: Part,
-    ray: RayShape,
-    body: Pose,
-}
-
-fn rotation(rng: &mut Rng) -> [f64; 4] {
-    let mut quat = [0.0; 4];
-    loop {
-        for x in &mut quat {
-            *x = 2.0 * rng.f64() - 1.0;
-        }
-        let norm = quat.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if norm > 0.1 && norm < 1.0 {
-            // what a frame in shared memory has
-            return quat.map(|x| f64::from((x / norm) as f32));
-        }
-    }
-}
-
-fn pose(rng: &mut Rng, reach: f64) -> Pose {
-    let pos = [0; 3].map(|_| f64::from((reach * (2.0 * rng.f64() - 1.0)) as f32));
-    Pose {
-        pos,
-        quat: rotation(rng),
-    }
-}
-
-fn mesh(rng: &mut Rng, size: f64) -> TriMesh {
-    let shape = match rng.u32(0..3) {
-        0 => Shape::Sphere { radius: size },
-        1 => Shape::Box {
-            half_extents: [size, 0.4 * size, 0.1 * size],
-        },
-        _ => Shape::Capsule {
-            radius: 0.3 * size,
-            half_height: size,
-        },
-    };
-    triangles(&shape)
-}
-
-fn part(rng: &mut Rng, label: i32) -> Seen {
-    // sizes of single precision, so that both sides have the same shape
-    let size = |rng: &mut Rng| f64::from((0.02 + 0.3 * rng.f64()) as f32);
-    let (a, b, c) = (size(rng), size(rng), size(rng));
-    let (look, ray) = match rng.u32(0..7) {
-        0 => (
-            Look::Shape(Shape::Box {
-                half_extents: [a, b, c],
-            }),
-            RayShape::Box([a, b, c]),
-        ),
-        1 => (
-            Look::Shape(Shape::Sphere { radius: a }),
-            RayShape::Sphere(a),
-        ),
-        2 => (
-            Look::Shape(Shape::Ellipsoid { radii: [a, b, c] }),
-            RayShape::Ellipsoid([a, b, c]),
-        ),
-        3 => (
-            Look::Shape(Shape::Cylinder {
-                radius: a,
-                half_height: b,
-            }),
-            RayShape::Cylinder(a, b),
-        ),
-        4 => (
-            Look::Shape(Shape::Capsule {
-                radius: a,
-                half_height: b,
-            }),
-            RayShape::Capsule(a, b),
-        ),
-        5 => (Look::Sheet([a, b]), RayShape::Plane([a, b])),
-        _ => {
-            let mesh = mesh(rng, a);
-            let ray = RayShape::Mesh(Arc::new(TriangleTree::new(&mesh)));
-            (Look::Triangles(Arc::new(mesh)), ray)
-        }
-    };
-    let body = pose(rng, 1.0);
-    let part = Part {
-        body: Some(label as usize / 2),
-        pose: pose(rng, 0.2),
-        look,
-        label,
-        paint: Paint::PLAIN,
-    };
-    Seen { part, ray, body }
-}
-
-fn frame(pose: &Pose) -> Frame {
-    Frame::new(pose.pos.map(|x| x as f32), pose.quat.map(|x| x as f32))
-}
 
 fn bits(depths: &[f32]) -> Vec<u32> {
     depths.iter().map(|depth| depth.to_bits()).collect()

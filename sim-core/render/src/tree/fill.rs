@@ -8,8 +8,9 @@
 //! u A = ((ũ·o + u₀) (-n) + G ũ)·d              as v A: the signs tell whether it is inside
 //! ```
 //!
-//! A tile goes down the tree as a whole, between the four planes through its edges. A few leaves are drawn triangle by
-//! triangle, eight rays at once; where there are more of them than pays, each ray goes down by itself.
+//! A tile goes down the tree as a whole, between the four planes through its edges, to the nearest leaves first. A few
+//! leaves are drawn triangle by triangle, a line of eight rays at once. Where there are more of them than pays, each ray
+//! goes down by itself.
 
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
@@ -26,8 +27,6 @@ const LEAVES_MAX: usize = 64;
 #[derive(Default)]
 pub(crate) struct Waiting {
     pub(super) stack: Stack,
-    /// Leaves with their least depths.
-    leaves: Vec<(f32, u32)>,
 }
 
 /// Four planes through the camera, beside the rays of a tile, and the direction in which it looks.
@@ -44,54 +43,46 @@ impl Tree {
     /// Shows its triangles, of number `thing`, in a tile.
     #[inline(always)]
     pub(crate) fn fill(&self, frame: &Frame, thing: u32, waiting: &mut Waiting, tile: &mut Tile) {
-        let origin = self.origin_at(frame.turn_back(three!(k => -frame.pos[k])));
-        let bundle = Bundle::new(frame, &origin, tile);
-        if !self.leaves_of(&bundle, waiting, tile.farthest()) {
-            self.fill_by_ray(frame, &origin, thing, waiting, tile);
+        if self.nodes.is_empty() {
             return;
         }
-        let mut farthest = f32::INFINITY;
-        for &(near, leaf) in &waiting.leaves {
-            if near < farthest {
-                self.leaves[leaf as usize].fill(frame, &origin, thing, tile);
-                farthest = tile.farthest();
-            }
-        }
-    }
-
-    /// Finds the leaves that a tile may see, the nearest first; false if there are too many.
-    #[inline(always)]
-    fn leaves_of(&self, bundle: &Bundle, waiting: &mut Waiting, farthest: f32) -> bool {
-        let (stack, leaves) = (&mut waiting.stack.0, &mut waiting.leaves);
-        leaves.clear();
-        if self.nodes.is_empty() {
-            return true;
-        }
-        let mut count = 1;
-        stack[0] = (0.0, 0);
+        let origin = self.origin_at(frame.turn_back(three!(k => -frame.pos[k])));
+        let bundle = Bundle::new(frame, &origin, tile);
+        let stack = &mut waiting.stack.0;
+        let (mut count, mut leaves) = (1, 0);
+        stack[0] = (f32::NEG_INFINITY, 0);
+        let mut farthest = tile.farthest();
         while count > 0 {
             count -= 1;
-            let node = &self.nodes[stack[count].1 as usize];
+            let (near, at) = stack[count];
+            if near > farthest {
+                continue;
+            }
+            if at & LEAF != 0 {
+                if leaves == LEAVES_MAX {
+                    return self.fill_by_ray(frame, &origin, thing, waiting, tile);
+                }
+                leaves += 1;
+                self.leaves[(at & !LEAF) as usize].fill(frame, &origin, thing, tile);
+                farthest = tile.farthest();
+                continue;
+            }
+            let node = &self.nodes[at as usize];
             let (near, mut bits) = bundle.boxes(node, farthest);
+            let first = count;
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize & 7;
                 bits &= bits - 1;
-                let (near, child) = (near[lane], node.children[lane]);
-                if child & LEAF == 0 {
-                    stack[count] = (near, child);
-                    count += 1;
-                } else if leaves.len() == LEAVES_MAX {
-                    return false;
-                } else {
-                    let place = leaves
-                        .iter()
-                        .rposition(|other| other.0 <= near)
-                        .map_or(0, |before| before + 1);
-                    leaves.insert(place, (near, child & !LEAF));
+                // the nearest child ends on top
+                let mut place = count;
+                while place > first && stack[place - 1].0 < near[lane] {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
                 }
+                stack[place] = (near[lane], node.children[lane]);
+                count += 1;
             }
         }
-        true
     }
 
     #[inline(always)]
@@ -204,22 +195,25 @@ struct Drawn {
 impl Leaf {
     #[inline(always)]
     fn fill(&self, frame: &Frame, origin: &Origin, thing: u32, tile: &mut Tile) {
-        let (drawn, mut bits) = self.seen_from(frame, origin);
+        let (drawn, front) = self.seen_from(frame, origin);
+        if front == 0 {
+            return;
+        }
         let x = F32x8::load(&tile.x);
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize & 7;
-            bits &= bits - 1;
-            let all = |numbers: &[[f32; 8]; 3], k: usize| F32x8::k(numbers[k][lane]);
-            let (a_y, u_y, v_y) = (all(&drawn.against, 1), all(&drawn.u, 1), all(&drawn.v, 1));
-            let a_x = x.fma(all(&drawn.against, 0), all(&drawn.against, 2));
-            let u_x = x.fma(all(&drawn.u, 0), all(&drawn.u, 2));
-            let v_x = x.fma(all(&drawn.v, 0), all(&drawn.v, 2));
-            let (height, slack) = (F32x8::k(drawn.height[lane]), F32x8::k(-drawn.slack[lane]));
-            for line in 0..EDGE {
-                let y = F32x8::k(tile.y[line]);
-                let (a, u, v) = (y.fma(a_y, a_x), y.fma(u_y, u_x), y.fma(v_y, v_x));
+        let bounds = drawn.bounds([tile.x[0], tile.x[EDGE - 1]]);
+        for line in 0..EDGE {
+            let mut bits = front & bounds.at(tile.y[line]);
+            let y = F32x8::k(tile.y[line]);
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & 7;
+                bits &= bits - 1;
+                let a = value(&drawn.against, lane, x, y);
+                let u = value(&drawn.u, lane, x, y);
+                let v = value(&drawn.v, lane, x, y);
+                let height = F32x8::k(drawn.height[lane]);
                 let least = u.min(v).min(a - u - v);
-                let is_met = slack.lt(least) & height.lt(F32x8::load(&tile.depth[line]) * a);
+                let is_met = F32x8::k(-drawn.slack[lane]).lt(least)
+                    & height.lt(F32x8::load(&tile.depth[line]) * a);
                 if F32x8::any(is_met) {
                     tile.keep(line, height.div(a), is_met, thing, self.number[lane]);
                 }
@@ -258,6 +252,48 @@ impl Leaf {
         height.store(&mut drawn.height);
         (F32x8::k(origin.slack) * F32x8::load(&self.steep)).store(&mut drawn.slack);
         (drawn, F32x8::bits(F32x8::k(0.0).lt(height)))
+    }
+}
+
+/// What a triangle needs of a line of rays.
+#[inline(always)]
+pub(super) fn value(factors: &[[f32; 8]; 3], lane: usize, x: F32x8, y: F32x8) -> F32x8 {
+    let [along, down, fixed] = [factors[0][lane], factors[1][lane], factors[2][lane]];
+    x.fma(F32x8::k(along), y.fma(F32x8::k(down), F32x8::k(fixed)))
+}
+
+/// The largest values on a line of rays that decide whether triangles are met: factors of y and 1.
+struct Bounds {
+    down: [F32x8; 3],
+    most: [F32x8; 3],
+    slack: F32x8,
+}
+
+impl Drawn {
+    /// Of lines between two places.
+    #[inline(always)]
+    fn bounds(&self, x: [f32; 2]) -> Bounds {
+        let factors = |k: usize| {
+            let [a, u, v] = [&self.against, &self.u, &self.v].map(|all| F32x8::load(&all[k]));
+            [u, v, a - u - v]
+        };
+        let (along, down, fixed) = (factors(0), factors(1), factors(2));
+        let most = three!(k => {
+            let ends = (along[k] * F32x8::k(x[0])).max(along[k] * F32x8::k(x[1]));
+            ends + fixed[k]
+        });
+        // roundings of these sums are below the slack's
+        let slack = F32x8::k(-2.0) * F32x8::load(&self.slack);
+        Bounds { down, most, slack }
+    }
+}
+
+impl Bounds {
+    /// Which triangles a line at y may meet: bits.
+    #[inline(always)]
+    fn at(&self, y: f32) -> u32 {
+        let value = three!(k => self.down[k].fma(F32x8::k(y), self.most[k]));
+        F32x8::bits(self.slack.lt(value[0].min(value[1]).min(value[2])))
     }
 }
 

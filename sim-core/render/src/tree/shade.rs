@@ -7,21 +7,22 @@
 //! A u = (A ũ + (ũ·l) n)·(a, b, 0) + A u₀ - (ũ·l) h       as A v: the signs tell whether it is inside
 //! ```
 //!
-//! The points of a tile go down the tree together, as what is over a rectangle. Where they meet more leaves than pays, each
-//! goes down by itself.
+//! Points go down the tree together, as what is over a rectangle. Where they meet more leaves than pays, each goes down by
+//! itself.
 
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use super::cast::Origin;
-use super::fill::{Waiting, corner, turned};
+use super::fill::{Waiting, corner, turned, value};
 use super::{LEAF, Leaf, Node, Tree};
-use crate::shadow::Lit;
+use crate::shadow::Few;
 use crate::tile::EDGE;
 use crate::vector::{Frame, Vector, three};
 
-/// Most leaves that are met triangle by triangle.
-const LEAVES_MAX: usize = 64;
+/// Most leaves that are met triangle by triangle: some, and one for so many points.
+const LEAVES_MAX: usize = 8;
+const POINTS: usize = 2;
 
 /// What is over a rectangle, as seen from a light: rays inside have products with these directions that are at least so
 /// large, in the frame of a tree.
@@ -33,14 +34,14 @@ struct Beam {
 impl Tree {
     /// Shades the points of a tile that its triangles are in the way of; `frame` is its own in that of the light.
     #[inline(always)]
-    pub(crate) fn shade(&self, frame: &Frame, waiting: &mut Waiting, lit: &mut Lit) {
+    pub(crate) fn shade(&self, frame: &Frame, waiting: &mut Waiting, few: &mut Few) {
         if self.nodes.is_empty() {
             return;
         }
         let slack = self
             .origin_at(frame.turn_back(three!(k => -frame.pos[k])))
             .slack;
-        let beam = Beam::new(frame, slack, lit);
+        let beam = Beam::new(frame, slack, few);
         let stack = &mut waiting.stack.0;
         let (mut count, mut leaves) = (1, 0);
         stack[0] = (0.0, 0);
@@ -56,29 +57,29 @@ impl Tree {
                     stack[count] = (0.0, node.children[lane]);
                     count += 1;
                 }
-            } else if leaves == LEAVES_MAX {
-                return self.shade_by_ray(frame, slack, waiting, lit);
+            } else if leaves == LEAVES_MAX + few.count / POINTS {
+                return self.shade_by_ray(frame, slack, waiting, few);
             } else {
                 leaves += 1;
-                self.leaves[(at & !LEAF) as usize].shade(frame, slack, lit);
+                self.leaves[(at & !LEAF) as usize].shade(frame, slack, few);
             }
         }
     }
 
     #[inline(always)]
-    fn shade_by_ray(&self, frame: &Frame, slack: f32, waiting: &mut Waiting, lit: &mut Lit) {
+    fn shade_by_ray(&self, frame: &Frame, slack: f32, waiting: &mut Waiting, few: &mut Few) {
         let direction = frame.rot[2];
-        for line in 0..EDGE {
-            for lane in 0..EDGE {
-                if lit.c[line][lane] == f32::INFINITY {
-                    continue;
-                }
-                let place = [lit.a[line][lane], lit.b[line][lane], lit.c[line][lane]];
-                let pos = frame.turn_back(three!(k => place[k] - frame.pos[k]));
-                let from = Origin { pos, slack };
-                if self.stops(&mut waiting.stack, &from, direction) {
-                    lit.c[line][lane] = f32::INFINITY;
-                }
+        for point in 0..few.count {
+            let [a, b, c] = &mut few.groups[point / EDGE % EDGE];
+            let lane = point % EDGE;
+            if c[lane] == f32::INFINITY {
+                continue;
+            }
+            let place = [a[lane], b[lane], c[lane]];
+            let pos = frame.turn_back(three!(k => place[k] - frame.pos[k]));
+            let from = Origin { pos, slack };
+            if self.stops(&mut waiting.stack, &from, direction) {
+                c[lane] = f32::INFINITY;
             }
         }
     }
@@ -86,16 +87,16 @@ impl Tree {
 
 impl Beam {
     #[inline(always)]
-    fn new(frame: &Frame, slack: f32, lit: &Lit) -> Beam {
+    fn new(frame: &Frame, slack: f32, few: &Few) -> Beam {
         let [a, b, c] = frame.rot;
         let sides = [a, three!(k => -a[k]), b, three!(k => -b[k]), c];
         let [x, y, z] = frame.pos;
         let least = [
-            lit.low[0] - x,
-            x - lit.high[0],
-            lit.low[1] - y,
-            y - lit.high[1],
-            lit.deep - z,
+            few.all[0][0] - x,
+            x - few.all[0][1],
+            few.all[1][0] - y,
+            y - few.all[1][1],
+            few.deep - z,
         ];
         Beam {
             sides,
@@ -129,27 +130,26 @@ struct Cast {
 
 impl Leaf {
     #[inline(always)]
-    fn shade(&self, frame: &Frame, slack: f32, lit: &mut Lit) {
-        let (cast, mut bits) = self.seen_along(frame, slack);
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize & 7;
-            bits &= bits - 1;
-            let all = |numbers: &[[f32; 8]; 3], k: usize| F32x8::k(numbers[k][lane]);
-            let against = F32x8::k(cast.against[lane]);
-            let slack = F32x8::k(-cast.slack[lane]);
-            let high = [all(&cast.high, 0), all(&cast.high, 1), all(&cast.high, 2)];
-            let u = [all(&cast.u, 0), all(&cast.u, 1), all(&cast.u, 2)];
-            let v = [all(&cast.v, 0), all(&cast.v, 1), all(&cast.v, 2)];
-            for line in 0..EDGE {
-                let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
-                let high = a.fma(high[0], b.fma(high[1], high[2]));
-                let u = a.fma(u[0], b.fma(u[1], u[2]));
-                let v = a.fma(v[0], b.fma(v[1], v[2]));
+    fn shade(&self, frame: &Frame, slack: f32, few: &mut Few) {
+        let (cast, front) = self.seen_along(frame, slack);
+        if front == 0 {
+            return;
+        }
+        for group in 0..few.in_use() {
+            let mut bits = front & cast.over(&few.bounds[group]);
+            let [a, b, c] = &mut few.groups[group];
+            let (a, b) = (F32x8::load(a), F32x8::load(b));
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & 7;
+                bits &= bits - 1;
+                let against = F32x8::k(cast.against[lane]);
+                let high = value(&cast.high, lane, a, b);
+                let u = value(&cast.u, lane, a, b);
+                let v = value(&cast.v, lane, a, b);
                 let least = u.min(v).min(against - u - v);
-                let is_met = slack.lt(least) & (F32x8::load(&lit.c[line]) * against).lt(high);
-                if F32x8::any(is_met) {
-                    lit.shade(line, is_met);
-                }
+                let before = F32x8::load(c);
+                let is_met = F32x8::k(-cast.slack[lane]).lt(least) & (before * against).lt(high);
+                F32x8::select(is_met, F32x8::k(f32::INFINITY), before).store(c);
             }
         }
     }
@@ -188,6 +188,28 @@ impl Leaf {
         (F32x8::k(slack) * F32x8::load(&self.steep)).store(&mut cast.slack);
         (cast, F32x8::bits(F32x8::k(0.0).lt(against)))
     }
+}
+
+impl Cast {
+    /// Which triangles may be over a rectangle: bits.
+    #[inline(always)]
+    fn over(&self, [a, b]: &[[f32; 2]; 2]) -> u32 {
+        let u = three!(k => F32x8::load(&self.u[k]));
+        let v = three!(k => F32x8::load(&self.v[k]));
+        let against = F32x8::load(&self.against);
+        let w = [-u[0] - v[0], -u[1] - v[1], against - u[2] - v[2]];
+        let least = most(&u, *a, *b).min(most(&v, *a, *b)).min(most(&w, *a, *b));
+        // roundings of these sums are below the slack's
+        F32x8::bits((F32x8::k(-2.0) * F32x8::load(&self.slack)).lt(least))
+    }
+}
+
+/// The largest value over a rectangle.
+#[inline(always)]
+fn most(factors: &[F32x8; 3], a: [f32; 2], b: [f32; 2]) -> F32x8 {
+    let along = (factors[0] * F32x8::k(a[0])).max(factors[0] * F32x8::k(a[1]));
+    let down = (factors[1] * F32x8::k(b[0])).max(factors[1] * F32x8::k(b[1]));
+    along + down + factors[2]
 }
 
 /// Products h with points of a frame, as those with the same points in the frame of a light: h + v·x, where `back` is x.
