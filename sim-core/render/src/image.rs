@@ -214,8 +214,7 @@ impl Scratch {
             let colors = lights.shade(scene, frames, casters, &mut self.waiting, &tile);
             for line in 0..EDGE.min(height - EDGE * place[1]) {
                 let start = (EDGE * place[1] + line) * width + EDGE * place[0];
-                let pixels = &colors[line][..columns];
-                to[3 * start..3 * (start + columns)].copy_from_slice(pixels.as_flattened());
+                to[3 * start..3 * (start + columns)].copy_from_slice(&colors[line][..3 * columns]);
             }
         }
     }

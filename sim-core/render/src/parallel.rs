@@ -6,7 +6,7 @@ use sim_physics::lane::Num;
 use sim_physics::lane::simd::F32x8;
 
 use crate::solids::Solid;
-use crate::vector::{Vector, dot, three};
+use crate::vector::{Frame, Vector, dot, three};
 
 type Mask = <F32x8 as Num>::Mask;
 type Points = [F32x8; 3];
@@ -14,13 +14,67 @@ type Points = [F32x8; 3];
 /// A square of the sine of an angle below which a ray is along an axis [–].
 const ALONG: f32 = 1e-12;
 
+/// A box in the frame of a light, in which rays go along z. On a ray through (a, b), it is between the planes of each pair
+/// of sides from c = x·(a, b, 1) - w to x·(a, b, 1) + w.
+#[derive(Clone, Copy)]
+pub(crate) struct Slabs {
+    middle: [Vector; 3],
+    width: Vector,
+}
+
+impl Slabs {
+    /// Of the box with these half edges about the origin of a frame.
+    #[inline(always)]
+    pub(crate) fn new(frame: &Frame, half: Vector) -> Slabs {
+        let (rot, start) = (&frame.rot, frame.turn_back(frame.pos));
+        // along a side, far away and not at a NaN
+        let inverse = three!(k => 1.0 / if rot[2][k].abs() < 1e-18 { 1e-18 } else { rot[2][k] });
+        Slabs {
+            middle: three!(k => {
+                [-rot[0][k] * inverse[k], -rot[1][k] * inverse[k], start[k] * inverse[k]]
+            }),
+            width: three!(k => (half[k] * inverse[k]).abs()),
+        }
+    }
+
+    /// Where rays enter the box and leave it.
+    #[inline(always)]
+    fn ends(&self, a: F32x8, b: F32x8) -> [F32x8; 2] {
+        let middle = three!(k => {
+            let [x, y, z] = self.middle[k];
+            a.fma(F32x8::k(x), b.fma(F32x8::k(y), F32x8::k(z)))
+        });
+        let enter = three!(k => middle[k] - F32x8::k(self.width[k]));
+        let leave = three!(k => middle[k] + F32x8::k(self.width[k]));
+        [
+            enter[0].max(enter[1]).max(enter[2]),
+            leave[0].min(leave[1]).min(leave[2]),
+        ]
+    }
+
+    /// Which rays meet the box, from inside too.
+    #[inline(always)]
+    pub(crate) fn hold(&self, a: F32x8, b: F32x8, c: F32x8) -> Mask {
+        let [enter, leave] = self.ends(a, b);
+        enter.lt(leave) & c.lt(leave)
+    }
+
+    /// Which rays enter the box from outside.
+    #[inline(always)]
+    pub(crate) fn stop(&self, a: F32x8, b: F32x8, c: F32x8) -> Mask {
+        let [enter, leave] = self.ends(a, b);
+        enter.lt(leave) & c.lt(enter)
+    }
+}
+
 impl Solid {
     /// Which rays from `o` along `d` enter it from outside.
     #[inline(always)]
     pub(crate) fn stops(&self, o: &Points, d: Vector) -> Mask {
         match *self {
             Solid::Plane(half) => plane(half, o, d),
-            Solid::Box(half) => sides(half, o, d),
+            // by its slabs, which are quicker
+            Solid::Box(_) => F32x8::k(1.0).lt(F32x8::k(0.0)),
             Solid::Ellipsoid(axes) => {
                 let d = three!(k => d[k] / axes[k]);
                 sphere(1.0, &three!(k => o[k] * F32x8::k(1.0 / axes[k])), d)
@@ -47,20 +101,6 @@ fn plane(half: [f32; 2], o: &Points, d: Vector) -> Mask {
     let is_within = !F32x8::k(half[0]).lt(x.abs()) & !F32x8::k(half[1]).lt(y.abs());
     // casters are planes whose front the rays meet
     zero.lt(o[2]) & is_within
-}
-
-#[inline(always)]
-fn sides(half: Vector, o: &Points, d: Vector) -> Mask {
-    let (mut enter, mut leave) = (F32x8::k(f32::NEG_INFINITY), F32x8::k(f32::INFINITY));
-    for k in 0..3 {
-        // along a side, far away and not at a NaN
-        let along = if d[k].abs() < 1e-18 { 1e-18 } else { d[k] };
-        let (inverse, width) = (F32x8::k(1.0 / along), F32x8::k((half[k] / along).abs()));
-        let middle = -o[k] * inverse;
-        enter = (middle - width).max(enter);
-        leave = (middle + width).min(leave);
-    }
-    enter.lt(leave) & F32x8::k(0.0).lt(enter)
 }
 
 /// Which rays enter a sphere from outside.

@@ -15,6 +15,9 @@ type Mask = <F32x8 as Num>::Mask;
 /// Numbers of a line of pixels: three coordinates, or three colours.
 type Line = [[f32; EDGE]; 3];
 
+/// Bytes of a line of pixels, and one more.
+pub(crate) const PIXELS: usize = 3 * EDGE + 1;
+
 /// Lights as a camera sees them.
 pub(crate) struct Lights {
     /// The frame of the key light, at the camera; its z points to where the light comes from.
@@ -55,7 +58,7 @@ impl Lights {
         casters: &mut Casters,
         waiting: &mut Waiting,
         tile: &Tile,
-    ) -> [[[u8; 3]; EDGE]; EDGE] {
+    ) -> [[u8; PIXELS]; EDGE] {
         let mut lit = Lit::NONE;
         let mut shown = Shown {
             normals: [[[0.0; EDGE]; 3]; EDGE],
@@ -73,13 +76,12 @@ impl Lights {
             let is_lit = is_lit & mask(shown.seen[line]);
             let depth = F32x8::load(&tile.depth[line]);
             let towards = turned_back(&self.key, &d);
-            let far = depth * squares(&d).sqrt();
-            lit.keep(line, &three!(k => towards[k] * depth), far, is_lit);
+            lit.keep(line, &three!(k => towards[k] * depth), depth, is_lit);
         }
         if self.shadows {
             casters.shade(scene, waiting, &mut lit);
         }
-        let mut pixels = [[[0; 3]; EDGE]; EDGE];
+        let mut pixels = [[0; PIXELS]; EDGE];
         for line in 0..EDGE {
             pixels[line] = self.line(tile, &shown, &lit, line);
         }
@@ -93,7 +95,7 @@ impl Lights {
     }
 
     #[inline(always)]
-    fn line(&self, tile: &Tile, shown: &Shown, lit: &Lit, line: usize) -> [[u8; 3]; EDGE] {
+    fn line(&self, tile: &Tile, shown: &Shown, lit: &Lit, line: usize) -> [u8; PIXELS] {
         let (zero, one) = (F32x8::k(0.0), F32x8::k(1.0));
         let d = tile.rays(line);
         let scale = one.div(squares(&d).sqrt());
@@ -228,7 +230,7 @@ const WHOLE: f32 = 8_388_608.0;
 
 /// Bytes of light, the same on every processor: a square root is correctly rounded.
 #[inline(always)]
-fn bytes(light: &Points) -> [[u8; 3]; EDGE] {
+fn bytes(light: &Points) -> [u8; PIXELS] {
     let mut lanes = [[0.0; EDGE]; 3];
     for k in 0..3 {
         let share = light[k].max(F32x8::k(0.0)).min(F32x8::k(1.0));
@@ -237,7 +239,14 @@ fn bytes(light: &Points) -> [[u8; 3]; EDGE] {
             .fma(F32x8::k(255.0), F32x8::k(WHOLE))
             .store(&mut lanes[k]);
     }
-    each!(lane in 0 1 2 3 4 5 6 7 => three!(k => lanes[k][lane].to_bits() as u8))
+    let mut pixels = [0; PIXELS];
+    for lane in 0..EDGE {
+        let [red, green, blue] = three!(k => lanes[k][lane].to_bits() & 0xff);
+        // the fourth byte is the next pixel's
+        let word = red | green << 8 | blue << 16;
+        pixels[3 * lane..3 * lane + 4].copy_from_slice(&word.to_le_bytes());
+    }
+    pixels
 }
 
 #[inline(always)]

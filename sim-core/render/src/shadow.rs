@@ -10,14 +10,17 @@ use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::normals::turned_back;
+use crate::parallel::Slabs;
 use crate::scene::{Scene, Surface};
 use crate::solids::Solid;
 use crate::tile::EDGE;
 use crate::tree::Waiting;
-use crate::vector::{Frame, Vector, three};
+use crate::vector::{Frame, Vector, dot, three};
 
-/// By how much rays begin nearer to the light, relative to the distance from the camera: more than the rounding of places.
-const AHEAD: f32 = 1e-5;
+/// By how much rays begin nearer to the light, relative to the depth: more than the rounding of places.
+const AHEAD: f32 = 2e-5;
+/// By how much boxes around trees are larger, relative to their size and to the distance from the camera.
+const WIDER: f32 = 1e-5;
 
 /// Points of a tile in the frame of a light.
 pub(crate) struct Lit {
@@ -26,10 +29,6 @@ pub(crate) struct Lit {
     pub(crate) b: [[f32; EDGE]; EDGE],
     /// Along it [m]; infinite where the light does not arrive, or nothing is seen.
     pub(crate) c: [[f32; EDGE]; EDGE],
-    /// Least and largest a and b, and the least c, of those that the light may reach [m].
-    pub(crate) low: [f32; 2],
-    pub(crate) high: [f32; 2],
-    pub(crate) deep: f32,
 }
 
 impl Lit {
@@ -37,29 +36,26 @@ impl Lit {
         a: [[0.0; EDGE]; EDGE],
         b: [[0.0; EDGE]; EDGE],
         c: [[f32::INFINITY; EDGE]; EDGE],
-        low: [0.0; 2],
-        high: [0.0; 2],
-        deep: 0.0,
     };
 
-    /// Keeps the points of a line, `p` in the frame of the light, at most so far from the camera [m].
+    /// Keeps the points of a line, `p` in the frame of the light.
     #[inline(always)]
     pub(crate) fn keep(
         &mut self,
         line: usize,
         p: &[F32x8; 3],
-        far: F32x8,
+        depth: F32x8,
         is_lit: <F32x8 as Num>::Mask,
     ) {
         p[0].store(&mut self.a[line]);
         p[1].store(&mut self.b[line]);
-        let ahead = far.fma(F32x8::k(AHEAD), p[2]);
+        let ahead = depth.fma(F32x8::k(AHEAD), p[2]);
         F32x8::select(is_lit, ahead, F32x8::k(f32::INFINITY)).store(&mut self.c[line]);
     }
 
-    /// Finds the bounds; false where there is no point.
+    /// Bounds of the points of each column that the light may reach; none where it reaches no point.
     #[inline(always)]
-    fn bound(&mut self) -> bool {
+    fn columns(&self) -> Option<Columns> {
         let endless = F32x8::k(f32::INFINITY);
         let (mut low, mut high) = ([endless; 2], [-endless; 2]);
         let mut deep = endless;
@@ -67,17 +63,13 @@ impl Lit {
             let c = F32x8::load(&self.c[line]);
             let is_lit = c.lt(endless);
             deep = c.min(deep);
-            let a = F32x8::load(&self.a[line]);
-            let b = F32x8::load(&self.b[line]);
-            low[0] = F32x8::select(is_lit, a, endless).min(low[0]);
-            low[1] = F32x8::select(is_lit, b, endless).min(low[1]);
-            high[0] = F32x8::select(is_lit, a, -endless).max(high[0]);
-            high[1] = F32x8::select(is_lit, b, -endless).max(high[1]);
+            let places = [F32x8::load(&self.a[line]), F32x8::load(&self.b[line])];
+            for k in 0..2 {
+                low[k] = F32x8::select(is_lit, places[k], endless).min(low[k]);
+                high[k] = F32x8::select(is_lit, places[k], -endless).max(high[k]);
+            }
         }
-        self.low = [least(low[0]), least(low[1])];
-        self.high = [-least(-high[0]), -least(-high[1])];
-        self.deep = least(deep);
-        self.deep < f32::INFINITY
+        F32x8::any(deep.lt(endless)).then_some(Columns { low, high, deep })
     }
 
     /// Marks points of a line as shaded.
@@ -88,12 +80,24 @@ impl Lit {
     }
 }
 
-#[inline(always)]
-fn least(x: F32x8) -> f32 {
-    let mut lanes = [0.0; EDGE];
-    x.store(&mut lanes);
-    let [a, b, c, d] = [0, 1, 2, 3].map(|k: usize| lanes[k].min(lanes[k + 4]));
-    a.min(b).min(c.min(d))
+/// Least and largest a and b, and least c, of the points of each column of a tile.
+struct Columns {
+    low: [F32x8; 2],
+    high: [F32x8; 2],
+    deep: F32x8,
+}
+
+impl Columns {
+    /// Whether a caster may be over points of any column.
+    #[inline(always)]
+    fn are_below(&self, caster: &Caster) -> bool {
+        let is_below = self.low[0].lt(F32x8::k(caster.high[0]))
+            & F32x8::k(caster.low[0]).lt(self.high[0])
+            & self.low[1].lt(F32x8::k(caster.high[1]))
+            & F32x8::k(caster.low[1]).lt(self.high[1])
+            & self.deep.lt(F32x8::k(caster.top));
+        F32x8::any(is_below)
+    }
 }
 
 /// A thing in the frame of a light.
@@ -104,6 +108,8 @@ struct Caster {
     low: [f32; 2],
     high: [f32; 2],
     top: f32,
+    /// The box around it.
+    slabs: Slabs,
 }
 
 /// What casts shadows.
@@ -136,26 +142,28 @@ impl Caster {
         line: usize,
         is_below: <F32x8 as Num>::Mask,
     ) -> u32 {
-        let (frame, [a, b]) = (
-            &self.frame,
-            [&lit.a, &lit.b].map(|all| F32x8::load(&all[line])),
-        );
-        let c = F32x8::select(is_below, F32x8::load(&lit.c[line]), F32x8::k(0.0));
-        let from = [
-            a - F32x8::k(frame.pos[0]),
-            b - F32x8::k(frame.pos[1]),
-            c - F32x8::k(frame.pos[2]),
-        ];
-        let o = turned_back(frame, &from);
-        match &scene.things[self.thing].surface {
-            Surface::Solid { solid, .. } => {
-                lit.shade(line, is_below & solid.stops(&o, frame.rot[2]));
-                0
+        let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
+        let c = F32x8::load(&lit.c[line]);
+        let solid = match &scene.things[self.thing].surface {
+            Surface::Triangles { .. } => {
+                return F32x8::bits(is_below & self.slabs.hold(a, b, c));
             }
-            Surface::Triangles { tree, .. } => {
-                F32x8::bits(is_below & is_within(tree.half, &o, frame.rot[2]))
-            }
-        }
+            Surface::Solid { solid, .. } => solid,
+        };
+        let is_stopped = if matches!(solid, Solid::Box(_)) {
+            self.slabs.stop(a, b, c)
+        } else {
+            let frame = &self.frame;
+            let c = F32x8::select(is_below, c, F32x8::k(0.0));
+            let from = [
+                a - F32x8::k(frame.pos[0]),
+                b - F32x8::k(frame.pos[1]),
+                c - F32x8::k(frame.pos[2]),
+            ];
+            solid.stops(&turned_back(frame, &from), frame.rot[2])
+        };
+        lit.shade(line, is_below & is_stopped);
+        0
     }
 }
 
@@ -190,6 +198,17 @@ impl Few {
     #[inline(always)]
     pub(crate) fn in_use(&self) -> usize {
         self.count.div_ceil(EDGE)
+    }
+
+    /// Whether all are.
+    #[inline(always)]
+    pub(crate) fn is_shaded(&self) -> bool {
+        let endless = F32x8::k(f32::INFINITY);
+        let mut least = endless;
+        for group in 0..self.in_use() {
+            least = F32x8::load(&self.groups[group][2]).min(least);
+        }
+        !F32x8::any(least.lt(endless))
     }
 
     #[inline(always)]
@@ -238,22 +257,6 @@ impl Few {
     }
 }
 
-/// Which rays from `o` along `d` meet a box, from inside too.
-#[inline(always)]
-fn is_within(half: Vector, o: &[F32x8; 3], d: Vector) -> <F32x8 as Num>::Mask {
-    let (mut enter, mut leave) = (F32x8::k(0.0), F32x8::k(f32::INFINITY));
-    for k in 0..3 {
-        let along = if d[k].abs() < 1e-18 { 1e-18 } else { d[k] };
-        let (inverse, width) = (1.0 / along, (half[k] / along).abs());
-        // more than the rounding
-        let middle = -o[k] * F32x8::k(inverse);
-        let width = middle.abs().fma(F32x8::k(1e-6), F32x8::k(1.000_01 * width));
-        enter = (middle - width).max(enter);
-        leave = (middle + width).min(leave);
-    }
-    !leave.lt(enter)
-}
-
 impl Casters {
     /// Those of a scene, from the frames of its things and the light in the frame of a camera.
     #[inline(always)]
@@ -274,12 +277,20 @@ impl Casters {
                 continue;
             }
             let reach = three!(k => reach(frame.rot[k], half));
+            let wider = match &scene.things[thing].surface {
+                Surface::Solid { .. } => half,
+                Surface::Triangles { .. } => {
+                    let away = dot(frame.pos, frame.pos).sqrt();
+                    three!(k => WIDER.mul_add(half[0] + half[1] + half[2] + away, half[k]))
+                }
+            };
             self.all.push(Caster {
                 thing,
                 frame,
                 low: [frame.pos[0] - reach[0], frame.pos[1] - reach[1]],
                 high: [frame.pos[0] + reach[0], frame.pos[1] + reach[1]],
                 top: frame.pos[2] + reach[2],
+                slabs: Slabs::new(&frame, wider),
             });
         }
     }
@@ -287,16 +298,11 @@ impl Casters {
     /// Shades the points of a tile.
     #[inline(always)]
     pub(crate) fn shade(&mut self, scene: &Scene, waiting: &mut Waiting, lit: &mut Lit) {
-        if !lit.bound() {
+        let Some(columns) = lit.columns() else {
             return;
-        }
+        };
         for caster in &self.all {
-            let is_beside = caster.high[0] < lit.low[0]
-                || caster.low[0] > lit.high[0]
-                || caster.high[1] < lit.low[1]
-                || caster.low[1] > lit.high[1]
-                || caster.top < lit.deep;
-            if is_beside {
+            if !columns.are_below(caster) {
                 continue;
             }
             for line in 0..EDGE {

@@ -27,6 +27,8 @@ const LEAVES_MAX: usize = 64;
 #[derive(Default)]
 pub(crate) struct Waiting {
     pub(super) stack: Stack,
+    /// Leaves that points may be below.
+    pub(super) leaves: Vec<u32>,
 }
 
 /// Four planes through the camera, beside the rays of a tile, and the direction in which it looks.
@@ -195,10 +197,9 @@ struct Drawn {
 impl Leaf {
     #[inline(always)]
     fn fill(&self, frame: &Frame, origin: &Origin, thing: u32, tile: &mut Tile) {
-        let (drawn, front) = self.seen_from(frame, origin);
-        if front == 0 {
+        let Some((drawn, front)) = self.seen_from(frame, origin) else {
             return;
-        }
+        };
         let x = F32x8::load(&tile.x);
         let bounds = drawn.bounds([tile.x[0], tile.x[EDGE - 1]]);
         for line in 0..EDGE {
@@ -221,12 +222,16 @@ impl Leaf {
         }
     }
 
-    /// What the triangles need of rays, and which show their front.
+    /// What the triangles need of rays, and which show their front; none if all show their back.
     #[inline(always)]
-    fn seen_from(&self, frame: &Frame, origin: &Origin) -> (Drawn, u32) {
+    fn seen_from(&self, frame: &Frame, origin: &Origin) -> Option<(Drawn, u32)> {
         let o = three!(k => F32x8::k(origin.pos[k]));
         let normal = three!(k => -F32x8::load(&self.normal[k]));
         let height = products(&self.normal, &o) - F32x8::load(&self.height);
+        let front = F32x8::bits(F32x8::k(0.0).lt(height));
+        if front == 0 {
+            return None;
+        }
         let mut drawn = Drawn {
             against: [[0.0; 8]; 3],
             u: [[0.0; 8]; 3],
@@ -251,7 +256,7 @@ impl Leaf {
         }
         height.store(&mut drawn.height);
         (F32x8::k(origin.slack) * F32x8::load(&self.steep)).store(&mut drawn.slack);
-        (drawn, F32x8::bits(F32x8::k(0.0).lt(height)))
+        Some((drawn, front))
     }
 }
 

@@ -20,9 +20,8 @@ use crate::shadow::Few;
 use crate::tile::EDGE;
 use crate::vector::{Frame, Vector, three};
 
-/// Most leaves that are met triangle by triangle: some, and one for so many points.
-const LEAVES_MAX: usize = 8;
-const POINTS: usize = 2;
+/// Most leaves that are met triangle by triangle: so many, and one for each point.
+const LEAVES_MAX: usize = 24;
 
 /// What is over a rectangle, as seen from a light: rays inside have products with these directions that are at least so
 /// large, in the frame of a tree.
@@ -42,28 +41,42 @@ impl Tree {
             .origin_at(frame.turn_back(three!(k => -frame.pos[k])))
             .slack;
         let beam = Beam::new(frame, slack, few);
-        let stack = &mut waiting.stack.0;
-        let (mut count, mut leaves) = (1, 0);
+        if !self.leaves_over(&beam, LEAVES_MAX + few.count, waiting) {
+            return self.shade_by_ray(frame, slack, waiting, few);
+        }
+        for &leaf in &waiting.leaves {
+            if self.leaves[leaf as usize].shade(frame, slack, few) && few.is_shaded() {
+                return;
+            }
+        }
+    }
+
+    /// Finds the leaves that may be over points; false if there are too many.
+    #[inline(always)]
+    fn leaves_over(&self, beam: &Beam, most: usize, waiting: &mut Waiting) -> bool {
+        let (stack, leaves) = (&mut waiting.stack.0, &mut waiting.leaves);
+        leaves.clear();
+        let mut count = 1;
         stack[0] = (0.0, 0);
         while count > 0 {
             count -= 1;
-            let at = stack[count].1;
-            if at & LEAF == 0 {
-                let node = &self.nodes[at as usize];
-                let mut bits = beam.boxes(node);
-                while bits != 0 {
-                    let lane = bits.trailing_zeros() as usize & 7;
-                    bits &= bits - 1;
-                    stack[count] = (0.0, node.children[lane]);
+            let node = &self.nodes[stack[count].1 as usize];
+            let mut bits = beam.boxes(node);
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & 7;
+                bits &= bits - 1;
+                let child = node.children[lane];
+                if child & LEAF == 0 {
+                    stack[count] = (0.0, child);
                     count += 1;
+                } else if leaves.len() == most {
+                    return false;
+                } else {
+                    leaves.push(child & !LEAF);
                 }
-            } else if leaves == LEAVES_MAX + few.count / POINTS {
-                return self.shade_by_ray(frame, slack, waiting, few);
-            } else {
-                leaves += 1;
-                self.leaves[(at & !LEAF) as usize].shade(frame, slack, few);
             }
         }
+        true
     }
 
     #[inline(always)]
@@ -129,12 +142,13 @@ struct Cast {
 }
 
 impl Leaf {
+    /// Shades points; true if there were any.
     #[inline(always)]
-    fn shade(&self, frame: &Frame, slack: f32, few: &mut Few) {
-        let (cast, front) = self.seen_along(frame, slack);
-        if front == 0 {
-            return;
-        }
+    fn shade(&self, frame: &Frame, slack: f32, few: &mut Few) -> bool {
+        let Some((cast, front)) = self.seen_along(frame, slack) else {
+            return false;
+        };
+        let mut is_any = false;
         for group in 0..few.in_use() {
             let mut bits = front & cast.over(&few.bounds[group]);
             let [a, b, c] = &mut few.groups[group];
@@ -149,14 +163,29 @@ impl Leaf {
                 let least = u.min(v).min(against - u - v);
                 let before = F32x8::load(c);
                 let is_met = F32x8::k(-cast.slack[lane]).lt(least) & (before * against).lt(high);
-                F32x8::select(is_met, F32x8::k(f32::INFINITY), before).store(c);
+                if F32x8::any(is_met) {
+                    F32x8::select(is_met, F32x8::k(f32::INFINITY), before).store(c);
+                    is_any = true;
+                }
             }
         }
+        is_any
     }
 
-    /// What the triangles need of rays, and which these meet from their front.
+    /// What the triangles need of rays, and which these meet from their front; none if they meet none.
     #[inline(always)]
-    fn seen_along(&self, frame: &Frame, slack: f32) -> (Cast, u32) {
+    fn seen_along(&self, frame: &Frame, slack: f32) -> Option<(Cast, u32)> {
+        let normal = three!(k => F32x8::load(&self.normal[k]));
+        let light = frame.rot[2];
+        let along = normal[2].fma(
+            F32x8::k(light[2]),
+            normal[1].fma(F32x8::k(light[1]), normal[0] * F32x8::k(light[0])),
+        );
+        let front = F32x8::bits(along.lt(F32x8::k(0.0)));
+        if front == 0 {
+            return None;
+        }
+
         let mut cast = Cast {
             against: [0.0; 8],
             high: [[0.0; 8]; 3],
@@ -166,7 +195,6 @@ impl Leaf {
         };
         // the place of the tree, in its own frame
         let back = frame.turn_back(frame.pos);
-        let normal = three!(k => F32x8::load(&self.normal[k]));
         turned(frame, &normal, &mut cast.high);
         let n = three!(k => F32x8::load(&cast.high[k]));
         let against = -n[2];
@@ -186,7 +214,7 @@ impl Leaf {
             (against * start - along * height).store(&mut to[2]);
         }
         (F32x8::k(slack) * F32x8::load(&self.steep)).store(&mut cast.slack);
-        (cast, F32x8::bits(F32x8::k(0.0).lt(against)))
+        Some((cast, front))
     }
 }
 
