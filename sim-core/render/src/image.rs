@@ -4,7 +4,7 @@ use sim_physics::lane::simd::widths;
 
 use crate::camera::Camera;
 use crate::scene::{Scene, Surface};
-use crate::shade::Lights;
+use crate::shade::{Lights, Shown};
 use crate::shadow::Casters;
 use crate::tile::{EDGE, Tile};
 use crate::tree::Waiting;
@@ -23,6 +23,7 @@ pub struct Scratch {
     /// Of each tile, things from the nearest to the farthest.
     tiles: Vec<Vec<u32>>,
     casters: Casters,
+    shown: Shown,
     waiting: Waiting,
 }
 
@@ -79,7 +80,7 @@ pub fn draw() -> Option<Draw> {
 }
 
 impl Scratch {
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn draw(
         &mut self,
         scene: &Scene,
@@ -123,7 +124,7 @@ impl Scratch {
     }
 
     /// Finds where things are, and which tiles may see them.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn place(
         &mut self,
         scene: &Scene,
@@ -169,7 +170,7 @@ impl Scratch {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn tile(
         &mut self,
         scene: &Scene,
@@ -210,11 +211,18 @@ impl Scratch {
             }
         }
         if let (Some(lights), Some(to)) = (lights, &mut image.rgb) {
-            let (frames, casters) = (&self.frames, &mut self.casters);
-            let colors = lights.shade(scene, frames, casters, &mut self.waiting, &tile);
+            lights.fall(
+                scene,
+                &self.frames,
+                &mut self.casters,
+                &mut self.waiting,
+                &tile,
+                &mut self.shown,
+            );
             for line in 0..EDGE.min(height - EDGE * place[1]) {
                 let start = (EDGE * place[1] + line) * width + EDGE * place[0];
-                to[3 * start..3 * (start + columns)].copy_from_slice(&colors[line][..3 * columns]);
+                let pixels = &lights.line(&tile, &self.shown, line)[..columns];
+                to[3 * start..3 * (start + columns)].copy_from_slice(pixels.as_flattened());
             }
         }
     }

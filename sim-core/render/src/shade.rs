@@ -7,6 +7,7 @@ use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, GLEAM, HIGH, HORIZON, SKY, UPW
 use crate::normals::{Points, turned, turned_back};
 use crate::scene::{Scene, Surface};
 use crate::shadow::{Casters, Lit};
+use crate::solids::Solid;
 use crate::tile::{EDGE, Tile};
 use crate::tree::Waiting;
 use crate::vector::{Frame, Vector, each, three};
@@ -14,9 +15,6 @@ use crate::vector::{Frame, Vector, each, three};
 type Mask = <F32x8 as Num>::Mask;
 /// Numbers of a line of pixels: three coordinates, or three colours.
 type Line = [[f32; EDGE]; 3];
-
-/// Bytes of a line of pixels, and one more.
-pub(crate) const PIXELS: usize = 3 * EDGE + 1;
 
 /// Lights as a camera sees them.
 pub(crate) struct Lights {
@@ -27,12 +25,24 @@ pub(crate) struct Lights {
     shadows: bool,
 }
 
-/// What the pixels of a tile show.
-struct Shown {
+/// What the pixels of a tile show, and where light arrives. Of lines that see nothing, only that.
+pub(crate) struct Shown {
     normals: [Line; EDGE],
     colors: [Line; EDGE],
     /// Which of a line see something: bits.
     seen: [u32; EDGE],
+    lit: Lit,
+}
+
+impl Default for Shown {
+    fn default() -> Shown {
+        Shown {
+            normals: [[[0.0; EDGE]; 3]; EDGE],
+            colors: [[[0.0; EDGE]; 3]; EDGE],
+            seen: [0; EDGE],
+            lit: Lit::NONE,
+        }
+    }
 }
 
 impl Lights {
@@ -49,43 +59,38 @@ impl Lights {
         }
     }
 
-    /// Colours of a tile, line by line, from the frames of all things and what casts shadows.
-    #[inline(always)]
-    pub(crate) fn shade(
+    /// Finds what a tile shows and where light arrives, from the frames of all things and what casts shadows.
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
+    pub(crate) fn fall(
         &self,
         scene: &Scene,
         frames: &[Frame],
         casters: &mut Casters,
         waiting: &mut Waiting,
         tile: &Tile,
-    ) -> [[u8; PIXELS]; EDGE] {
-        let mut lit = Lit::NONE;
-        let mut shown = Shown {
-            normals: [[[0.0; EDGE]; 3]; EDGE],
-            colors: [[[0.0; EDGE]; 3]; EDGE],
-            seen: [0; EDGE],
-        };
+        shown: &mut Shown,
+    ) {
         for line in 0..EDGE {
             let d = tile.rays(line);
             shown.look(scene, frames, tile, &d, line);
-            if shown.seen[line] == 0 {
+            let seen = shown.seen[line];
+            if seen == 0 {
+                shown.lit.c[line] = [f32::INFINITY; EDGE];
                 continue;
             }
             let normal = three!(k => F32x8::load(&shown.normals[line][k]));
-            let is_lit = F32x8::k(0.0).lt(products(&normal, self.direction()));
-            let is_lit = is_lit & mask(shown.seen[line]);
+            let mut is_lit = F32x8::k(0.0).lt(products(&normal, self.direction()));
+            if seen != 0xff {
+                is_lit = is_lit & mask(seen);
+            }
             let depth = F32x8::load(&tile.depth[line]);
             let towards = turned_back(&self.key, &d);
-            lit.keep(line, &three!(k => towards[k] * depth), depth, is_lit);
+            let place = three!(k => towards[k] * depth);
+            shown.lit.keep(line, &place, depth, is_lit);
         }
         if self.shadows {
-            casters.shade(scene, waiting, &mut lit);
+            casters.shade(scene, waiting, &mut shown.lit);
         }
-        let mut pixels = [[0; PIXELS]; EDGE];
-        for line in 0..EDGE {
-            pixels[line] = self.line(tile, &shown, &lit, line);
-        }
-        pixels
     }
 
     /// Where the key light comes from.
@@ -94,15 +99,16 @@ impl Lights {
         three!(k => self.key.rot[k][2])
     }
 
-    #[inline(always)]
-    fn line(&self, tile: &Tile, shown: &Shown, lit: &Lit, line: usize) -> [u8; PIXELS] {
+    /// Colours of a line of a tile.
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
+    pub(crate) fn line(&self, tile: &Tile, shown: &Shown, line: usize) -> [[u8; 3]; EDGE] {
         let (zero, one) = (F32x8::k(0.0), F32x8::k(1.0));
         let d = tile.rays(line);
+        // one over the length of a ray
         let scale = one.div(squares(&d).sqrt());
-        let ray = three!(k => d[k] * scale);
         let mut light = [zero; 3];
         if shown.seen[line] != 0xff {
-            let t = (products(&ray, self.up) * F32x8::k(1.0 / HIGH))
+            let t = (products(&d, self.up) * scale * F32x8::k(1.0 / HIGH))
                 .max(zero)
                 .min(one);
             let share = t * t * (F32x8::k(3.0) - t - t);
@@ -115,15 +121,15 @@ impl Lights {
                 products(&n, self.up).fma(F32x8::k(0.5 * UPWARD), F32x8::k(AMBIENT + 0.5 * UPWARD));
             let mut amount = fill.fma(F32x8::k(FILLED), upward);
             let mut gleam = zero;
-            let arrives = F32x8::load(&lit.c[line]).lt(F32x8::k(f32::INFINITY));
+            let arrives = F32x8::load(&shown.lit.c[line]).lt(F32x8::k(f32::INFINITY));
             if F32x8::any(arrives) {
                 let key = self.direction();
                 let facing = F32x8::select(arrives, products(&n, key), zero);
                 amount = facing.fma(F32x8::k(BRIGHT), amount);
                 // n·h with h = (k - r) / |k - r|
-                let square = F32x8::k(2.0) - F32x8::k(2.0) * products(&ray, key);
-                let along = n[2].fma(ray[2], n[1].fma(ray[1], n[0] * ray[0]));
-                let middle = (facing - along)
+                let square = F32x8::k(2.0) - F32x8::k(2.0) * scale * products(&d, key);
+                let along = n[2].fma(d[2], n[1].fma(d[1], n[0] * d[0]));
+                let middle = (facing - along * scale)
                     .div(square.max(F32x8::k(1e-12)).sqrt())
                     .max(zero);
                 let square = middle * middle;
@@ -132,11 +138,11 @@ impl Lights {
                 let sixteenth = eighth * eighth;
                 gleam = F32x8::select(arrives, sixteenth * sixteenth * F32x8::k(GLEAM), zero);
             }
-            let is_seen = mask(shown.seen[line]);
-            light = three!(k => {
-                let color = F32x8::load(&shown.colors[line][k]);
-                F32x8::select(is_seen, color.fma(amount, gleam), light[k])
-            });
+            let seen = three!(k => F32x8::load(&shown.colors[line][k]).fma(amount, gleam));
+            light = match shown.seen[line] {
+                0xff => seen,
+                some => three!(k => F32x8::select(mask(some), seen[k], light[k])),
+            };
         }
         bytes(&light)
     }
@@ -157,15 +163,19 @@ impl Shown {
             let (normal, color) = match &scene.things[thing as usize].surface {
                 Surface::Solid { solid, coat, .. } => {
                     let depth = F32x8::load(&tile.depth[line]);
-                    let p = turned_back(
-                        frame,
-                        &three!(k => d[k].fma(depth, F32x8::k(-frame.pos[k]))),
-                    );
-                    let is_dark = is_dark(coat.per, &p);
-                    let color = three!(k => {
-                        F32x8::select(is_dark, F32x8::k(coat.tones[1][k]), F32x8::k(coat.tones[0][k]))
-                    });
-                    (solid.normals(&p), color)
+                    let from = three!(k => d[k].fma(depth, F32x8::k(-frame.pos[k])));
+                    let p = turned_back(frame, &from);
+                    let [light, dark] = coat.tones;
+                    let mut color = three!(k => F32x8::k(light[k]));
+                    if coat.per[0] != 0.0 {
+                        let is_dark = is_dark(coat.per, &p);
+                        color = three!(k => F32x8::select(is_dark, F32x8::k(dark[k]), color[k]));
+                    }
+                    let normal = match solid {
+                        Solid::Plane(_) => three!(k => F32x8::k(frame.rot[k][2])),
+                        solid => turned(frame, &solid.normals(&p)),
+                    };
+                    (normal, color)
                 }
                 Surface::Triangles { faces, tones, .. } => {
                     let (mut normals, mut colors) = ([[0.0; EDGE]; 3], [[0.0; EDGE]; 3]);
@@ -180,13 +190,18 @@ impl Shown {
                             colors[k][lane] = tone[k];
                         }
                     }
-                    (
-                        three!(k => F32x8::load(&normals[k])),
-                        three!(k => F32x8::load(&colors[k])),
-                    )
+                    let normal = three!(k => F32x8::load(&normals[k]));
+                    (turned(frame, &normal), three!(k => F32x8::load(&colors[k])))
                 }
             };
-            let (normal, is_here) = (turned(frame, &normal), mask(lanes));
+            if lanes == 0xff {
+                for k in 0..3 {
+                    normal[k].store(&mut self.normals[line][k]);
+                    color[k].store(&mut self.colors[line][k]);
+                }
+                return;
+            }
+            let is_here = mask(lanes);
             for k in 0..3 {
                 let before = F32x8::load(&self.normals[line][k]);
                 F32x8::select(is_here, normal[k], before).store(&mut self.normals[line][k]);
@@ -230,7 +245,7 @@ const WHOLE: f32 = 8_388_608.0;
 
 /// Bytes of light, the same on every processor: a square root is correctly rounded.
 #[inline(always)]
-fn bytes(light: &Points) -> [u8; PIXELS] {
+fn bytes(light: &Points) -> [[u8; 3]; EDGE] {
     let mut lanes = [[0.0; EDGE]; 3];
     for k in 0..3 {
         let share = light[k].max(F32x8::k(0.0)).min(F32x8::k(1.0));
@@ -239,14 +254,7 @@ fn bytes(light: &Points) -> [u8; PIXELS] {
             .fma(F32x8::k(255.0), F32x8::k(WHOLE))
             .store(&mut lanes[k]);
     }
-    let mut pixels = [0; PIXELS];
-    for lane in 0..EDGE {
-        let [red, green, blue] = three!(k => lanes[k][lane].to_bits() & 0xff);
-        // the fourth byte is the next pixel's
-        let word = red | green << 8 | blue << 16;
-        pixels[3 * lane..3 * lane + 4].copy_from_slice(&word.to_le_bytes());
-    }
-    pixels
+    each!(lane in 0 1 2 3 4 5 6 7 => three!(k => lanes[k][lane].to_bits() as u8))
 }
 
 #[inline(always)]

@@ -58,10 +58,11 @@ impl Lit {
     fn columns(&self) -> Option<Columns> {
         let endless = F32x8::k(f32::INFINITY);
         let (mut low, mut high) = ([endless; 2], [-endless; 2]);
-        let mut deep = endless;
+        let (mut deep, mut lines) = (endless, 0);
         for line in 0..EDGE {
             let c = F32x8::load(&self.c[line]);
             let is_lit = c.lt(endless);
+            lines |= u32::from(F32x8::any(is_lit)) << line;
             deep = c.min(deep);
             let places = [F32x8::load(&self.a[line]), F32x8::load(&self.b[line])];
             for k in 0..2 {
@@ -69,7 +70,12 @@ impl Lit {
                 high[k] = F32x8::select(is_lit, places[k], -endless).max(high[k]);
             }
         }
-        F32x8::any(deep.lt(endless)).then_some(Columns { low, high, deep })
+        (lines != 0).then_some(Columns {
+            low,
+            high,
+            deep,
+            lines,
+        })
     }
 
     /// Marks points of a line as shaded.
@@ -85,6 +91,8 @@ struct Columns {
     low: [F32x8; 2],
     high: [F32x8; 2],
     deep: F32x8,
+    /// Lines with such points: bits.
+    lines: u32,
 }
 
 impl Columns {
@@ -296,7 +304,7 @@ impl Casters {
     }
 
     /// Shades the points of a tile.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     pub(crate) fn shade(&mut self, scene: &Scene, waiting: &mut Waiting, lit: &mut Lit) {
         let Some(columns) = lit.columns() else {
             return;
@@ -305,11 +313,14 @@ impl Casters {
             if !columns.are_below(caster) {
                 continue;
             }
-            for line in 0..EDGE {
+            self.below = [0; EDGE];
+            let mut lines = columns.lines;
+            while lines != 0 {
+                let line = lines.trailing_zeros() as usize & (EDGE - 1);
+                lines &= lines - 1;
                 let is_below = caster.is_over(lit, line);
-                self.below[line] = match F32x8::any(is_below) {
-                    true => caster.stops(scene, lit, line, is_below),
-                    false => 0,
+                if F32x8::any(is_below) {
+                    self.below[line] = caster.stops(scene, lit, line, is_below);
                 }
             }
             if let Surface::Triangles { tree, .. } = &scene.things[caster.thing].surface {

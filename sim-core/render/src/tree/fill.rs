@@ -43,7 +43,7 @@ struct Bundle {
 
 impl Tree {
     /// Shows its triangles, of number `thing`, in a tile.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     pub(crate) fn fill(&self, frame: &Frame, thing: u32, waiting: &mut Waiting, tile: &mut Tile) {
         if self.nodes.is_empty() {
             return;
@@ -87,7 +87,7 @@ impl Tree {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn fill_by_ray(
         &self,
         frame: &Frame,

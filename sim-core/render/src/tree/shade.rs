@@ -32,7 +32,7 @@ struct Beam {
 
 impl Tree {
     /// Shades the points of a tile that its triangles are in the way of; `frame` is its own in that of the light.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     pub(crate) fn shade(&self, frame: &Frame, waiting: &mut Waiting, few: &mut Few) {
         if self.nodes.is_empty() {
             return;
@@ -79,7 +79,7 @@ impl Tree {
         true
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn shade_by_ray(&self, frame: &Frame, slack: f32, waiting: &mut Waiting, few: &mut Few) {
         let direction = frame.rot[2];
         for point in 0..few.count {
