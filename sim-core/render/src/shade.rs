@@ -129,10 +129,8 @@ impl Lights {
                 // n·h with h = (k - r) / |k - r|
                 let square = F32x8::k(2.0) - F32x8::k(2.0) * scale * products(&d, key);
                 let along = n[2].fma(d[2], n[1].fma(d[1], n[0] * d[0]));
-                let middle = (facing - along * scale)
-                    .div(square.max(F32x8::k(1e-12)).sqrt())
-                    .max(zero);
-                let square = middle * middle;
+                let middle = (facing - along * scale).max(zero);
+                let square = (middle * middle).div(square.max(F32x8::k(1e-12)));
                 let fourth = square * square;
                 let eighth = fourth * fourth;
                 let sixteenth = eighth * eighth;

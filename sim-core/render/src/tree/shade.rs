@@ -22,6 +22,8 @@ use crate::vector::{Frame, Vector, three};
 
 /// Most leaves that are met triangle by triangle: so many, and one for each point.
 const LEAVES_MAX: usize = 24;
+/// Most points that go down one by one at once.
+const FEW: usize = 4;
 
 /// What is over a rectangle, as seen from a light: rays inside have products with these directions that are at least so
 /// large, in the frame of a tree.
@@ -41,7 +43,8 @@ impl Tree {
             .origin_at(frame.turn_back(three!(k => -frame.pos[k])))
             .slack;
         let beam = Beam::new(frame, slack, few);
-        if !self.leaves_over(&beam, LEAVES_MAX + few.count, waiting) {
+        let most = LEAVES_MAX + few.count;
+        if few.count <= FEW || !self.leaves_over(&beam, most, waiting) {
             return self.shade_by_ray(frame, slack, waiting, few);
         }
         for &leaf in &waiting.leaves {
