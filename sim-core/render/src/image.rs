@@ -190,6 +190,9 @@ impl Scratch {
                 Surface::Solid { solid, .. } => {
                     solid.fill(&seen.frame, seen.thing as u32, &mut tile)
                 }
+                Surface::Field { field, .. } => {
+                    field.fill(&seen.frame, seen.thing as u32, &mut tile)
+                }
                 Surface::Triangles { tree, .. } => {
                     tree.fill(&seen.frame, seen.thing as u32, &mut self.waiting, &mut tile);
                 }

@@ -6,6 +6,7 @@
 //! An image depends on its world alone: its bits are the same for any number of worlds and threads.
 
 mod camera;
+mod field;
 mod image;
 mod light;
 mod normals;

@@ -1,10 +1,10 @@
 //! Normals of shapes at points on their surfaces, for eight rays.
 
-use sim_physics::lane::Num;
 use sim_physics::lane::simd::F32x8;
+use sim_physics::lane::{Lane, Num};
 
 use crate::solids::Solid;
-use crate::vector::{Frame, three};
+use crate::vector::{Frame, each, three};
 
 /// Coordinates of eight points or directions.
 pub(crate) type Points = [F32x8; 3];
@@ -25,6 +25,13 @@ pub(crate) fn turned_back(frame: &Frame, v: &Points) -> Points {
     three!(k => {
         v[2].fma(F32x8::k(rot[2][k]), v[1].fma(F32x8::k(rot[1][k]), v[0] * F32x8::k(rot[0][k])))
     })
+}
+
+/// The lanes of bits.
+#[inline(always)]
+pub(crate) fn mask(bits: u32) -> <F32x8 as Num>::Mask {
+    let lanes = each!(lane in 0 1 2 3 4 5 6 7 => (bits >> lane & 1) as f32);
+    F32x8::k(0.5).lt(F32x8::load(&lanes))
 }
 
 impl Solid {

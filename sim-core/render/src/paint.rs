@@ -91,6 +91,11 @@ impl Paint {
         }
     }
 
+    /// Light that walls of height fields reflect.
+    pub(crate) fn wall(&self) -> Light {
+        self.light(if self.squares { TONES[3][0] } else { 1.0 })
+    }
+
     /// Light that a triangle of a height field reflects.
     pub(crate) fn on_field(&self, field: &HeightField, corners: &[Point; 3]) -> Light {
         if !self.squares {

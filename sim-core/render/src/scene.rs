@@ -1,12 +1,12 @@
 //! What cameras see: the shapes of a scene, and where they are in a world.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use sim_model::Pose;
 use sim_model::geometry::vector::{Vector as Point, cross, dot, sub};
 use sim_model::geometry::{HeightField, Shape, TriMesh};
 
+use crate::field::Field;
 use crate::light::KeyLight;
 use crate::paint::{Coat, Light, Paint};
 use crate::solids::Solid;
@@ -66,6 +66,10 @@ pub(crate) enum Surface {
         /// Light that faces reflect.
         tones: Vec<Light>,
     },
+    Field {
+        field: Field,
+        label: i32,
+    },
 }
 
 /// What light falls on.
@@ -100,7 +104,22 @@ impl Scene {
                         coat,
                     },
                 }),
-                Seen::Triangles(mesh, field) => {
+                Seen::Field(field) => {
+                    let (field, center) = Field::new(field, &part.paint);
+                    let center = Frame {
+                        pos: [0.0, 0.0, center],
+                        ..Frame::IDENTITY
+                    };
+                    things.push(Thing {
+                        body: part.body,
+                        frame: frame(&part.pose).then(&center),
+                        surface: Surface::Field {
+                            field,
+                            label: part.label,
+                        },
+                    });
+                }
+                Seen::Triangles(mesh) => {
                     let joined = meshes.iter().position(|other| other.body == part.body);
                     let joined = joined.unwrap_or_else(|| {
                         meshes.push(Joined {
@@ -109,7 +128,7 @@ impl Scene {
                         });
                         meshes.len() - 1
                     });
-                    meshes[joined].add(&mesh, field, part);
+                    meshes[joined].add(&mesh, part);
                 }
             }
         }
@@ -135,7 +154,7 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn label(&self, thing: u32, triangle: u32) -> i32 {
         match self.things.get(thing as usize).map(|thing| &thing.surface) {
-            Some(Surface::Solid { label, .. }) => *label,
+            Some(Surface::Solid { label, .. } | Surface::Field { label, .. }) => *label,
             Some(Surface::Triangles { labels, .. }) => labels[triangle as usize],
             None => NOTHING,
         }
@@ -159,21 +178,20 @@ struct Joined {
 }
 
 impl Joined {
-    fn add(&mut self, mesh: &TriMesh, field: Option<&HeightField>, part: &Part) {
-        let plain = part.paint.light(1.0);
-        for &triangle in &mesh.triangles {
-            let corners = mesh.corners(triangle);
-            let tone = field.map_or(plain, |field| part.paint.on_field(field, &corners));
-            self.triangles
-                .push(corners.map(|corner| part.pose.transform(corner)));
-            let same = |other: &Light| other.map(f32::to_bits) == tone.map(f32::to_bits);
-            // a part has few tones: those of this one are the last
-            let place = self.tones.iter().rposition(same).unwrap_or_else(|| {
-                self.tones.push(tone);
-                self.tones.len() - 1
-            });
-            self.chosen.push(place as u32);
-        }
+    fn add(&mut self, mesh: &TriMesh, part: &Part) {
+        let tone = part.paint.light(1.0);
+        let same = |other: &Light| other.map(f32::to_bits) == tone.map(f32::to_bits);
+        let place = self.tones.iter().position(same).unwrap_or_else(|| {
+            self.tones.push(tone);
+            self.tones.len() - 1
+        });
+        let corners = mesh
+            .triangles
+            .iter()
+            .map(|&triangle| mesh.corners(triangle));
+        self.triangles
+            .extend(corners.map(|corners| corners.map(|corner| part.pose.transform(corner))));
+        self.chosen.resize(self.triangles.len(), place as u32);
         self.labels.resize(self.triangles.len(), part.label);
     }
 
@@ -215,14 +233,15 @@ impl Thing {
         match &self.surface {
             Surface::Solid { solid, .. } => solid.half(),
             Surface::Triangles { tree, .. } => tree.half,
+            Surface::Field { field, .. } => field.half,
         }
     }
 }
 
 enum Seen<'a> {
     Solid(Solid, Coat),
-    /// Of a height field, too.
-    Triangles(Cow<'a, TriMesh>, Option<&'a HeightField>),
+    Triangles(&'a TriMesh),
+    Field(&'a HeightField),
 }
 
 fn seen(part: &Part) -> Seen<'_> {
@@ -230,7 +249,7 @@ fn seen(part: &Part) -> Seen<'_> {
     let plane =
         |half: [f64; 2]| Seen::Solid(Solid::Plane(half.map(single)), part.paint.on_plane(half));
     let solid = match &part.look {
-        Look::Triangles(mesh) => return Seen::Triangles(Cow::Borrowed(mesh), None),
+        Look::Triangles(mesh) => return Seen::Triangles(mesh),
         Look::Sheet(half) => return plane(*half),
         Look::Shape(shape) => match shape {
             Shape::Plane => return plane([f64::INFINITY; 2]),
@@ -245,10 +264,8 @@ fn seen(part: &Part) -> Seen<'_> {
                 radius,
                 half_height,
             } => Solid::Capsule(single(*radius), single(*half_height)),
-            Shape::Mesh(mesh) => return Seen::Triangles(Cow::Borrowed(&mesh.triangles), None),
-            Shape::HeightField(field) => {
-                return Seen::Triangles(Cow::Owned(field.surface()), Some(&**field));
-            }
+            Shape::Mesh(mesh) => return Seen::Triangles(&mesh.triangles),
+            Shape::HeightField(field) => return Seen::Field(field),
         },
     };
     Seen::Solid(solid, part.paint.on_solid())

@@ -4,7 +4,7 @@ use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, GLEAM, HIGH, HORIZON, SKY, UPWARD};
-use crate::normals::{Points, turned, turned_back};
+use crate::normals::{Points, mask, turned, turned_back};
 use crate::scene::{Scene, Surface};
 use crate::shadow::{Casters, Lit};
 use crate::solids::Solid;
@@ -175,6 +175,18 @@ impl Shown {
                     };
                     (normal, color)
                 }
+                Surface::Field { field, .. } => {
+                    let numbers = &tile.triangles[line];
+                    let mut colors = [[0.0; EDGE]; 3];
+                    for lane in 0..EDGE {
+                        let tone = field.tone(numbers[lane]);
+                        for k in 0..3 {
+                            colors[k][lane] = tone[k];
+                        }
+                    }
+                    let normal = turned(frame, &field.normals(numbers));
+                    (normal, three!(k => F32x8::load(&colors[k])))
+                }
                 Surface::Triangles { faces, tones, .. } => {
                     let (mut normals, mut colors) = ([[0.0; EDGE]; 3], [[0.0; EDGE]; 3]);
                     let mut left = lanes;
@@ -218,13 +230,6 @@ fn same(numbers: &[u32; EDGE], number: u32) -> u32 {
         bits |= u32::from(numbers[lane] == number) << lane;
     }
     bits
-}
-
-/// The lanes of bits.
-#[inline(always)]
-fn mask(bits: u32) -> Mask {
-    let lanes = each!(lane in 0 1 2 3 4 5 6 7 => (bits >> lane & 1) as f32);
-    F32x8::k(0.5).lt(F32x8::load(&lanes))
 }
 
 /// Which points lie on dark squares, `per` of which are in a metre.

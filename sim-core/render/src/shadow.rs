@@ -9,7 +9,7 @@
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
-use crate::normals::turned_back;
+use crate::normals::{mask, turned_back};
 use crate::parallel::Slabs;
 use crate::scene::{Scene, Surface};
 use crate::solids::Solid;
@@ -116,8 +116,9 @@ struct Caster {
     low: [f32; 2],
     high: [f32; 2],
     top: f32,
-    /// The box around it.
+    /// The box around it, and whether it is one.
     slabs: Slabs,
+    is_box: bool,
 }
 
 /// What casts shadows.
@@ -141,37 +142,35 @@ impl Caster {
             & F32x8::load(&lit.c[line]).lt(F32x8::k(self.top))
     }
 
-    /// Shades the points of a line below a solid; of triangles, tells which rays meet the box around them.
+    /// Which rays from a line meet the box around it, or enter it from outside if it is a box.
     #[inline(always)]
-    fn stops(
-        &self,
-        scene: &Scene,
-        lit: &mut Lit,
-        line: usize,
-        is_below: <F32x8 as Num>::Mask,
-    ) -> u32 {
+    fn meets(&self, lit: &Lit, line: usize) -> <F32x8 as Num>::Mask {
         let (a, b) = (F32x8::load(&lit.a[line]), F32x8::load(&lit.b[line]));
         let c = F32x8::load(&lit.c[line]);
-        let solid = match &scene.things[self.thing].surface {
-            Surface::Triangles { .. } => {
-                return F32x8::bits(is_below & self.slabs.hold(a, b, c));
-            }
-            Surface::Solid { solid, .. } => solid,
-        };
-        let is_stopped = if matches!(solid, Solid::Box(_)) {
-            self.slabs.stop(a, b, c)
-        } else {
-            let frame = &self.frame;
-            let c = F32x8::select(is_below, c, F32x8::k(0.0));
-            let from = [
-                a - F32x8::k(frame.pos[0]),
-                b - F32x8::k(frame.pos[1]),
-                c - F32x8::k(frame.pos[2]),
-            ];
-            solid.stops(&turned_back(frame, &from), frame.rot[2])
+        match self.is_box {
+            true => self.slabs.stop(a, b, c),
+            false => self.slabs.hold(a, b, c),
+        }
+    }
+
+    /// Shades points of a line below a shape that is no box and has no tree.
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
+    fn shade(&self, surface: &Surface, lit: &mut Lit, line: usize, below: u32) {
+        let is_below = mask(below);
+        let frame = &self.frame;
+        let c = F32x8::select(is_below, F32x8::load(&lit.c[line]), F32x8::k(0.0));
+        let from = [
+            F32x8::load(&lit.a[line]) - F32x8::k(frame.pos[0]),
+            F32x8::load(&lit.b[line]) - F32x8::k(frame.pos[1]),
+            c - F32x8::k(frame.pos[2]),
+        ];
+        let (o, d) = (turned_back(frame, &from), frame.rot[2]);
+        let is_stopped = match surface {
+            Surface::Solid { solid, .. } => solid.stops(&o, d),
+            Surface::Field { field, .. } => field.stops(&o, d, is_below),
+            Surface::Triangles { .. } => return,
         };
         lit.shade(line, is_below & is_stopped);
-        0
     }
 }
 
@@ -280,14 +279,21 @@ impl Casters {
                     ..
                 }
             );
+            let is_box = matches!(
+                scene.things[thing].surface,
+                Surface::Solid {
+                    solid: Solid::Box(_),
+                    ..
+                }
+            );
             // a plane that faces the light is met from behind
             if is_plane && frame.rot[2][2] >= 0.0 {
                 continue;
             }
             let reach = three!(k => reach(frame.rot[k], half));
             let wider = match &scene.things[thing].surface {
-                Surface::Solid { .. } => half,
-                Surface::Triangles { .. } => {
+                Surface::Solid { .. } if is_box => half,
+                _ => {
                     let away = dot(frame.pos, frame.pos).sqrt();
                     three!(k => WIDER.mul_add(half[0] + half[1] + half[2] + away, half[k]))
                 }
@@ -299,6 +305,7 @@ impl Casters {
                 high: [frame.pos[0] + reach[0], frame.pos[1] + reach[1]],
                 top: frame.pos[2] + reach[2],
                 slabs: Slabs::new(&frame, wider),
+                is_box,
             });
         }
     }
@@ -319,16 +326,29 @@ impl Casters {
                 let line = lines.trailing_zeros() as usize & (EDGE - 1);
                 lines &= lines - 1;
                 let is_below = caster.is_over(lit, line);
-                if F32x8::any(is_below) {
-                    self.below[line] = caster.stops(scene, lit, line, is_below);
+                if !F32x8::any(is_below) {
+                    continue;
+                }
+                let is_met = is_below & caster.meets(lit, line);
+                if caster.is_box {
+                    lit.shade(line, is_met);
+                } else {
+                    self.below[line] = F32x8::bits(is_met);
                 }
             }
-            if let Surface::Triangles { tree, .. } = &scene.things[caster.thing].surface {
-                self.few.gather(lit, &self.below);
-                if self.few.count > 0 {
-                    tree.shade(&caster.frame, waiting, &mut self.few);
-                    self.few.scatter(lit);
+            let surface = &scene.things[caster.thing].surface;
+            let Surface::Triangles { tree, .. } = surface else {
+                for line in 0..EDGE {
+                    if self.below[line] != 0 {
+                        caster.shade(surface, lit, line, self.below[line]);
+                    }
                 }
+                continue;
+            };
+            self.few.gather(lit, &self.below);
+            if self.few.count > 0 {
+                tree.shade(&caster.frame, waiting, &mut self.few);
+                self.few.scatter(lit);
             }
         }
     }

@@ -81,6 +81,19 @@ impl Tile {
         thing: u32,
         triangle: u32,
     ) {
+        self.keep_each(line, depth, is_met, thing, &[triangle; EDGE]);
+    }
+
+    /// The same, of a triangle for each ray.
+    #[inline(always)]
+    pub(crate) fn keep_each(
+        &mut self,
+        line: usize,
+        depth: F32x8,
+        is_met: <F32x8 as Num>::Mask,
+        thing: u32,
+        triangles: &[u32; EDGE],
+    ) {
         let before = F32x8::load(&self.depth[line]);
         let is_met = is_met & depth.lt(before) & F32x8::k(self.near).lt(depth);
         F32x8::select(is_met, depth, before).store(&mut self.depth[line]);
@@ -89,7 +102,7 @@ impl Tile {
             let lane = bits.trailing_zeros() as usize & (EDGE - 1);
             bits &= bits - 1;
             self.things[line][lane] = thing;
-            self.triangles[line][lane] = triangle;
+            self.triangles[line][lane] = triangles[lane];
         }
     }
 }

@@ -3,7 +3,7 @@
 mod random;
 
 use fastrand::Rng;
-use random::{Seen, frame, part, rotation};
+use random::{Seen, field, frame, part, rotation};
 use sim_model::Pose;
 use sim_model::geometry::vector::{Vector, dot, sub};
 use sim_model::geometry::{RayShape, Shape};
@@ -120,88 +120,130 @@ fn floor() -> Seen {
     }
 }
 
-#[test]
-fn colours_are_those_of_rays_in_double_precision() {
-    let Some(draw) = draw() else {
-        return;
-    };
-    let rng = &mut Rng::with_seed(3);
-    let scratch = &mut Scratch::default();
-    let (mut pixels, mut at_edges, mut wrong, mut shaded) = (0, 0, 0, 0);
-    for scene_number in 0..40 {
-        let count = rng.usize(1..30);
-        let mut parts: Vec<Seen> = (0..count as i32).map(|label| part(rng, label)).collect();
-        for at in (1..count).step_by(2) {
-            parts[at].body = parts[at - 1].body;
-        }
-        let bodies: Vec<Frame> = parts
-            .iter()
-            .step_by(2)
-            .map(|seen| frame(&seen.body))
-            .collect();
-        parts.push(floor());
+/// What is different in images.
+#[derive(Default)]
+struct Counts {
+    pixels: usize,
+    shaded: usize,
+    at_edges: usize,
+    wrong: usize,
+}
+
+impl Counts {
+    /// Draws parts, of which those that move are in pairs, and compares each pixel.
+    fn compare(&mut self, parts: &[Seen], key: Option<Vector>, eye: &Pose, camera: &Camera) {
+        let Some(draw) = draw() else {
+            return;
+        };
+        let moving = parts.iter().filter(|seen| seen.part.body.is_some());
+        let bodies: Vec<Frame> = moving.step_by(2).map(|seen| frame(&seen.body)).collect();
         let given: Vec<Part> = parts.iter().map(|seen| seen.part.clone()).collect();
-        let key = (scene_number % 3 == 0).then(|| [rng.f64() - 0.5, rng.f64() - 0.5, 0.6]);
         let light = KeyLight::from_direction(key.unwrap_or(KEY)).unwrap();
-        let scene = Scene::new(&given).lit_by(light);
-        let turned = Pose {
-            pos: [0.0; 3],
-            quat: rotation(rng),
-        };
-        let eye = turned.mul(&Pose::at([0.0, 0.0, -2.8]));
-        let eye = Pose {
-            pos: eye.pos.map(|x| f64::from(x as f32)),
-            quat: eye.quat.map(|x| f64::from(x as f32)),
-        };
-        let camera = Camera::with_fov(rng.usize(1..60), rng.usize(1..60), 0.9, 100.0);
-        let mut depth = vec![f32::NAN; camera.width * camera.height];
-        let mut rgb = vec![77; 3 * depth.len()];
-        let mut image = Image {
-            depth: &mut depth,
-            labels: None,
-            rgb: Some(&mut rgb),
-        };
-        draw(&scene, &bodies, &frame(&eye), &camera, scratch, &mut image);
-        let mut light = light;
-        light.shadows = false;
-        let mut bright = vec![77; 3 * depth.len()];
-        let mut image = Image {
-            depth: &mut depth,
-            labels: None,
-            rgb: Some(&mut bright),
-        };
-        let scene = scene.lit_by(light);
-        draw(&scene, &bodies, &frame(&eye), &camera, scratch, &mut image);
-        let pairs = rgb.as_chunks::<3>().0.iter().zip(bright.as_chunks::<3>().0);
-        shaded += pairs.filter(|(ours, bright)| ours != bright).count();
+        let mut dark = light;
+        dark.shadows = false;
+        let scratch = &mut Scratch::default();
+        let [rgb, bright] = [light, dark].map(|light| {
+            let scene = Scene::new(&given).lit_by(light);
+            let mut depth = vec![f32::NAN; camera.width * camera.height];
+            let mut rgb = vec![77; 3 * depth.len()];
+            let mut image = Image {
+                depth: &mut depth,
+                labels: None,
+                rgb: Some(&mut rgb),
+            };
+            draw(&scene, &bodies, &frame(eye), camera, scratch, &mut image);
+            rgb
+        });
+        let pairs = rgb.chunks(3).zip(bright.chunks(3));
+        self.shaded += pairs.filter(|(ours, bright)| ours != bright).count();
         for row in 0..camera.height {
             for column in 0..camera.width {
                 let ours = &rgb[3 * (row * camera.width + column)..][..3];
                 let seen = |right: f64, down: f64| {
-                    let tip = tip(&camera, column as f64 + right, row as f64 + down);
-                    reference(&parts, &eye, tip, key)
+                    let tip = tip(camera, column as f64 + right, row as f64 + down);
+                    reference(parts, eye, tip, key)
                 };
-                pixels += 1;
+                self.pixels += 1;
                 let expected = seen(0.0, 0.0);
                 if is_near(ours, expected) {
                     continue;
                 }
-                at_edges += 1;
+                self.at_edges += 1;
                 let around = (0..8).map(|k| std::f64::consts::FRAC_PI_4 * f64::from(k));
                 let mut around = around.map(|angle| seen(NEAR * angle.cos(), NEAR * angle.sin()));
                 if !around.any(|expected| is_near(ours, expected)) {
-                    wrong += 1;
-                    if wrong < 20 {
-                        println!("{scene_number}: {column} {row}: {ours:?}, not {expected:?}");
+                    self.wrong += 1;
+                    if self.wrong < 20 {
+                        println!("{column} {row}: {ours:?}, not {expected:?}");
                     }
                 }
             }
         }
     }
-    println!("{pixels} pixels, {shaded} in shadows, {at_edges} at edges, {wrong} differ");
-    assert!(pixels > 10_000 && shaded > 500);
-    assert!(at_edges * 500 < pixels, "{at_edges} of {pixels}");
-    assert!(wrong * 20_000 < pixels, "{wrong} of {pixels}");
+
+    fn check(&self) {
+        let Counts {
+            pixels,
+            shaded,
+            at_edges,
+            wrong,
+        } = self;
+        println!("{pixels} pixels, {shaded} in shadows, {at_edges} at edges, {wrong} differ");
+        if draw().is_some() {
+            assert!(*pixels > 10_000 && *shaded > 500);
+            assert!(at_edges * 500 < *pixels, "{at_edges} of {pixels}");
+            assert!(wrong * 20_000 < *pixels, "{wrong} of {pixels}");
+        }
+    }
+}
+
+/// A camera around the origin that looks at it, as a frame in shared memory has it.
+fn eye(rng: &mut Rng, away: f64) -> Pose {
+    let turned = Pose {
+        pos: [0.0; 3],
+        quat: rotation(rng),
+    };
+    let eye = turned.mul(&Pose::at([0.0, 0.0, -away]));
+    Pose {
+        pos: eye.pos.map(|x| f64::from(x as f32)),
+        quat: eye.quat.map(|x| f64::from(x as f32)),
+    }
+}
+
+#[test]
+fn colours_are_those_of_rays_in_double_precision() {
+    let rng = &mut Rng::with_seed(3);
+    let mut counts = Counts::default();
+    for scene in 0..40 {
+        let count = rng.usize(1..30);
+        let mut parts: Vec<Seen> = (0..count as i32).map(|label| part(rng, label)).collect();
+        for at in (1..count).step_by(2) {
+            parts[at].body = parts[at - 1].body;
+        }
+        parts.push(floor());
+        let key = (scene % 3 == 0).then(|| [rng.f64() - 0.5, rng.f64() - 0.5, 0.6]);
+        let camera = Camera::with_fov(rng.usize(1..60), rng.usize(1..60), 0.9, 100.0);
+        counts.compare(&parts, key, &eye(rng, 2.8), &camera);
+    }
+    counts.check();
+}
+
+#[test]
+fn height_fields_look_like_their_triangles() {
+    let rng = &mut Rng::with_seed(4);
+    let mut counts = Counts::default();
+    for scene in 0..40 {
+        let samples = [rng.usize(2..60), rng.usize(2..60)];
+        let mut parts: Vec<Seen> = (0..4).map(|label| part(rng, label)).collect();
+        for at in [1, 3] {
+            parts[at].body = parts[at - 1].body;
+        }
+        parts.push(field(rng, samples, 77));
+        let key = (scene % 2 == 0).then(|| [rng.f64() - 0.5, rng.f64() - 0.5, 0.3]);
+        let camera = Camera::with_fov(rng.usize(1..60), rng.usize(1..60), 0.9, 100.0);
+        counts.compare(&parts, key, &eye(rng, 2.8), &camera);
+    }
+    counts.check();
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod random;
 
 use fastrand::Rng;
-use random::{Seen, frame, part, rotation};
+use random::{Seen, field, frame, part, rotation};
 use sim_model::Pose;
 use sim_model::geometry::Shape;
 use sim_render::{Camera, Frame, Image, Look, NOTHING, Paint, Part, Scene, Scratch, draw};
@@ -98,6 +98,10 @@ fn depths_and_labels_are_those_of_rays_in_double_precision() {
             .step_by(2)
             .map(|seen| frame(&seen.body))
             .collect();
+        if rng.bool() {
+            let samples = [rng.usize(2..100), rng.usize(2..100)];
+            parts.push(field(rng, samples, 77));
+        }
         let given: Vec<Part> = parts.iter().map(|seen| seen.part.clone()).collect();
         let scene = Scene::new(&given);
         // no part is around the camera

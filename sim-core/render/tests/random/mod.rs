@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 use sim_model::Pose;
-use sim_model::geometry::{RayShape, Shape, TriMesh, TriangleTree, triangles};
+use sim_model::geometry::{HeightField, RayShape, Shape, TriMesh, TriangleTree, triangles};
 use sim_render::{Frame, Look, Paint, Part};
 
 /// A part, what rays in `f64` meet of it, and the frame of its body.
@@ -33,6 +33,29 @@ fn pose(rng: &mut Rng, reach: f64) -> Pose {
     Pose {
         pos,
         quat: rotation(rng),
+    }
+}
+
+/// A height field of random elevations about the origin, with as many samples along x and y, and its triangles.
+pub fn field(rng: &mut Rng, [columns, rows]: [usize; 2], label: i32) -> Seen {
+    let rough = if rng.bool() { 0.3 } else { 0.02 };
+    // of single precision, so that both sides have the same shape
+    let elevations = (0..rows * columns).map(|_| f64::from((rough * rng.f64()) as f32));
+    let field = HeightField::new([rows, columns], elevations.collect(), [2.0, 3.0], 0.25);
+    let field = field.unwrap();
+    Seen {
+        ray: RayShape::Mesh(Arc::new(TriangleTree::new(&field.surface()))),
+        part: Part {
+            body: None,
+            pose: pose(rng, 0.2),
+            look: Look::Shape(Shape::HeightField(Arc::new(field))),
+            label,
+            paint: Paint {
+                color: [rng.f32(), rng.f32(), rng.f32(), 1.0],
+                squares: false,
+            },
+        },
+        body: Pose::identity(),
     }
 }
 
