@@ -7,7 +7,7 @@ use crate::scene::{Scene, Surface};
 use crate::shade::{Lights, Shown};
 use crate::shadow::Casters;
 use crate::tile::{EDGE, Tile};
-use crate::tree::Waiting;
+use crate::tree::{Bundle, Waiting, Walk};
 use crate::vector::{Frame, Vector, dot, three};
 
 /// Depths below which a corner of a box is not projected [m].
@@ -16,8 +16,13 @@ const SMALL: f32 = 1e-6;
 /// Memory that images need meanwhile: one for each thread.
 #[derive(Default)]
 pub struct Scratch {
-    /// Of all things, in the frame of the camera.
+    /// Of all things, in the frame of the camera; of those that rest, of which something is seen.
     frames: Vec<Frame>,
+    /// Those that rest, once a tile asked for them.
+    resting: Vec<Resting>,
+    /// Counts images, so that nothing of an earlier one is taken for one of this.
+    image: u64,
+    walk: Walk,
     things: Vec<Seen>,
     order: Vec<u32>,
     /// Of each tile, things from the nearest to the farthest.
@@ -36,6 +41,15 @@ struct Seen {
     near: f32,
     /// First and last columns and rows of tiles that it may be in.
     tiles: [[usize; 2]; 2],
+    /// First and last rows of pixels.
+    rows: [usize; 2],
+}
+
+/// A thing of the tree of those that rest, in an image.
+#[derive(Clone, Copy, Debug, Default)]
+struct Resting {
+    image: u64,
+    seen: Option<Seen>,
 }
 
 /// Where an image goes, row by row. `(height, width)` each, if not said otherwise
@@ -114,11 +128,11 @@ impl Scratch {
         self.place(scene, bodies, eye, camera, [across, down]);
         let lights = image.rgb.is_some().then(|| Lights::new(scene, eye));
         if let Some(lights) = lights.as_ref().filter(|_| scene.light.shadows) {
-            self.casters.place(scene, &self.frames, &lights.key);
+            self.casters.place(scene, &self.frames, eye, &lights.key);
         }
         for row in 0..down {
             for column in 0..across {
-                self.tile(scene, camera, lights.as_ref(), [column, row], image);
+                self.tile(scene, eye, camera, lights.as_ref(), [column, row], image);
             }
         }
     }
@@ -135,21 +149,18 @@ impl Scratch {
     ) {
         self.things.clear();
         self.frames.clear();
-        for (number, thing) in scene.things.iter().enumerate() {
+        self.frames.resize(scene.resting, Frame::IDENTITY);
+        self.resting.resize(scene.resting, Resting::default());
+        self.image += 1;
+        for (number, thing) in scene.things.iter().enumerate().skip(scene.resting) {
             let in_world = match thing.body {
                 Some(body) => bodies[body].then(&thing.frame),
                 None => thing.frame,
             };
             let frame = eye.relative(&in_world);
             self.frames.push(frame);
-            if let Some((near, tiles)) = extent(&frame, thing.half(), camera, tiles) {
-                self.things.push(Seen {
-                    thing: number,
-                    frame,
-                    near,
-                    tiles,
-                });
-            }
+            self.things
+                .extend(Seen::new(number, frame, thing.half(), camera));
         }
         self.order.clear();
         self.order.extend(0..self.things.len() as u32);
@@ -174,6 +185,7 @@ impl Scratch {
     fn tile(
         &mut self,
         scene: &Scene,
+        eye: &Frame,
         camera: &Camera,
         lights: Option<&Lights>,
         place: [usize; 2],
@@ -188,7 +200,8 @@ impl Scratch {
             }
             match &scene.things[seen.thing].surface {
                 Surface::Solid { solid, .. } => {
-                    solid.fill(&seen.frame, seen.thing as u32, &mut tile)
+                    let lines = seen.lines(place[1]);
+                    solid.fill(&seen.frame, seen.thing as u32, lines, &mut tile)
                 }
                 Surface::Field { field, .. } => {
                     field.fill(&seen.frame, seen.thing as u32, &mut tile)
@@ -198,6 +211,7 @@ impl Scratch {
                 }
             }
         }
+        self.rest(scene, eye, camera, place, &mut tile);
         let [width, height] = [camera.width, camera.height];
         let columns = EDGE.min(width - EDGE * place[0]);
         for line in 0..EDGE.min(height - EDGE * place[1]) {
@@ -229,56 +243,104 @@ impl Scratch {
             }
         }
     }
+
+    /// Shows things that rest in a tile.
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
+    fn rest(
+        &mut self,
+        scene: &Scene,
+        eye: &Frame,
+        camera: &Camera,
+        place: [usize; 2],
+        tile: &mut Tile,
+    ) {
+        let Some(tree) = &scene.tree else {
+            return;
+        };
+        let world = eye.relative(&Frame::IDENTITY);
+        let bundle = Bundle::new(&world, &tree.origin_at(eye.pos), tile);
+        self.walk.start();
+        while let Some(leaf) = self.walk.next_seen(tree, &bundle, tile.farthest()) {
+            for &number in leaf {
+                let thing = &scene.things[number];
+                if self.resting[number].image != self.image {
+                    let frame = eye.relative(&thing.frame);
+                    self.frames[number] = frame;
+                    self.resting[number] = Resting {
+                        image: self.image,
+                        seen: Seen::new(number, frame, thing.half(), camera),
+                    };
+                }
+                let Some(seen) = &self.resting[number].seen else {
+                    continue;
+                };
+                let [columns, rows] = seen.tiles;
+                let is_here = (columns[0]..=columns[1]).contains(&place[0])
+                    && (rows[0]..=rows[1]).contains(&place[1]);
+                if let (true, Surface::Solid { solid, .. }) = (is_here, &thing.surface) {
+                    solid.fill(&seen.frame, number as u32, seen.lines(place[1]), tile);
+                }
+            }
+        }
+    }
 }
 
-/// Least depth of a box about the origin of a frame, and the tiles that it may be in; none where it is behind the camera or
-/// beside the image.
-#[inline(always)]
-fn extent(
-    frame: &Frame,
-    half: Vector,
-    camera: &Camera,
-    tiles: [usize; 2],
-) -> Option<(f32, [[usize; 2]; 2])> {
-    let all = [[0, tiles[0] - 1], [0, tiles[1] - 1]];
-    if half.iter().any(|x| x.is_infinite()) {
-        return Some((camera.near, all));
-    }
-    let reach = dot(three!(k => frame.rot[2][k].abs()), half);
-    let (near, far) = (frame.pos[2] - reach, frame.pos[2] + reach);
-    if far < camera.near || near > camera.far {
-        return None;
-    }
-    if near < SMALL {
-        return Some((camera.near, all));
-    }
-    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-    for corner in 0..8 {
-        let side = |k: usize| {
-            if corner >> k & 1 == 0 {
-                -half[k]
-            } else {
-                half[k]
-            }
+impl Seen {
+    /// A thing in a box about the origin of its frame; none where it is behind the camera or beside the image.
+    #[inline(always)]
+    fn new(thing: usize, frame: Frame, half: Vector, camera: &Camera) -> Option<Seen> {
+        let pixels = [camera.width, camera.height];
+        let mut seen = Seen {
+            thing,
+            frame,
+            near: camera.near,
+            tiles: pixels.map(|count| [0, (count - 1) / EDGE]),
+            rows: [0, camera.height - 1],
         };
-        let turned = frame.turn([side(0), side(1), side(2)]);
-        let [x, y, z] = three!(k => frame.pos[k] + turned[k]);
-        let place = [x / z, y / z];
-        for k in 0..2 {
-            low[k] = low[k].min(place[k]);
-            high[k] = high[k].max(place[k]);
+        if half.iter().any(|x| x.is_infinite()) {
+            return Some(seen);
         }
-    }
-    let pixels = [camera.width, camera.height];
-    let mut range = [[0; 2]; 2];
-    for k in 0..2 {
-        // a pixel more on each side than the middles of pixels inside
-        let first = low[k].mul_add(camera.focal[k], camera.center[k]) - 1.0;
-        let last = high[k].mul_add(camera.focal[k], camera.center[k]) + 1.0;
-        if last < 0.0 || first > pixels[k] as f32 {
+        let reach = dot(three!(k => frame.rot[2][k].abs()), half);
+        let (near, far) = (frame.pos[2] - reach, frame.pos[2] + reach);
+        if far < camera.near || near > camera.far {
             return None;
         }
-        range[k] = [first, last].map(|pixel| (pixel.max(0.0) as usize / EDGE).min(tiles[k] - 1));
+        if near < SMALL {
+            return Some(seen);
+        }
+        seen.near = near;
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for corner in 0..8 {
+            let side = three!(k => if corner >> k & 1 == 0 { -half[k] } else { half[k] });
+            let turned = frame.turn(side);
+            let [x, y, z] = three!(k => frame.pos[k] + turned[k]);
+            let place = [x / z, y / z];
+            for k in 0..2 {
+                low[k] = low[k].min(place[k]);
+                high[k] = high[k].max(place[k]);
+            }
+        }
+        for k in 0..2 {
+            // a pixel more on each side than the middles of pixels inside
+            let first = low[k].mul_add(camera.focal[k], camera.center[k]) - 1.0;
+            let last = high[k].mul_add(camera.focal[k], camera.center[k]) + 1.0;
+            if last < 0.0 || first > pixels[k] as f32 {
+                return None;
+            }
+            let range = [first, last].map(|pixel| (pixel.max(0.0) as usize).min(pixels[k] - 1));
+            seen.tiles[k] = range.map(|pixel| pixel / EDGE);
+            if k == 1 {
+                seen.rows = range;
+            }
+        }
+        Some(seen)
     }
-    Some((near, range))
+
+    /// Lines of a row of tiles that it may be in.
+    #[inline(always)]
+    fn lines(&self, row: usize) -> std::ops::Range<usize> {
+        let start = EDGE * row;
+        let last = self.rows[1].min(start + EDGE - 1);
+        self.rows[0].saturating_sub(start)..(last + 1).saturating_sub(start)
+    }
 }

@@ -9,6 +9,7 @@ mod camera;
 mod field;
 mod image;
 mod light;
+mod lit;
 mod normals;
 mod paint;
 mod parallel;

@@ -10,11 +10,14 @@ use crate::field::Field;
 use crate::light::KeyLight;
 use crate::paint::{Coat, Light, Paint};
 use crate::solids::Solid;
-use crate::tree::Tree;
+use crate::tree::{PartTree, Tree};
 use crate::vector::{Frame, Vector};
 
 /// Label of pixels where nothing is seen.
 pub const NOTHING: i32 = -1;
+
+/// Most solids at rest that are no tree: each is placed in each image.
+const FEW: usize = 32;
 
 /// What a part looks like.
 #[derive(Clone, Debug)]
@@ -85,6 +88,9 @@ pub(crate) struct Face {
 pub struct Scene {
     pub(crate) things: Vec<Thing>,
     pub(crate) light: KeyLight,
+    /// The first of them that rest, which are many, are in a tree.
+    pub(crate) resting: usize,
+    pub(crate) tree: Option<PartTree>,
     bodies: usize,
 }
 
@@ -133,6 +139,10 @@ impl Scene {
             }
         }
         things.extend(meshes.into_iter().map(Joined::thing));
+        // the order of others stays
+        things.sort_by_key(|thing| thing.box_at_rest().is_none());
+        let boxes: Vec<[Point; 2]> = things.iter().map_while(Thing::box_at_rest).collect();
+        let resting = if boxes.len() > FEW { boxes.len() } else { 0 };
         let bodies = parts
             .iter()
             .filter_map(|part| part.body)
@@ -141,6 +151,8 @@ impl Scene {
         Scene {
             things,
             light: KeyLight::default(),
+            resting,
+            tree: (resting > 0).then(|| PartTree::new(&boxes)),
             bodies,
         }
     }
@@ -228,6 +240,21 @@ fn normal([a, b, c]: &[Point; 3]) -> Vector {
 }
 
 impl Thing {
+    /// The box in the world around a solid that does not move; none of others, and where it has no end [m].
+    fn box_at_rest(&self) -> Option<[Point; 2]> {
+        let is_solid = matches!(self.surface, Surface::Solid { .. });
+        let half = self.half();
+        if self.body.is_some() || !is_solid || half.iter().any(|x| x.is_infinite()) {
+            return None;
+        }
+        let reach = self.frame.rot.map(|row| {
+            let products = [0, 1, 2].map(|k| f64::from(row[k].abs()) * f64::from(half[k]));
+            products.iter().sum::<f64>()
+        });
+        let pos = self.frame.pos.map(f64::from);
+        Some([sub(pos, reach), [0, 1, 2].map(|k| pos[k] + reach[k])])
+    }
+
     /// Half edges of the box around it, whose centre is the origin of its frame [m].
     pub(crate) fn half(&self) -> Vector {
         match &self.surface {

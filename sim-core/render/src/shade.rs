@@ -4,9 +4,10 @@ use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, GLEAM, HIGH, HORIZON, SKY, UPWARD};
+use crate::lit::Lit;
 use crate::normals::{Points, mask, turned, turned_back};
 use crate::scene::{Scene, Surface};
-use crate::shadow::{Casters, Lit};
+use crate::shadow::Casters;
 use crate::solids::Solid;
 use crate::tile::{EDGE, Tile};
 use crate::tree::Waiting;

@@ -7,10 +7,12 @@
 //!
 //! A shape is seen from outside alone. So a ray that begins inside passes through, as in renderers.
 
+use std::ops::Range;
+
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
-use crate::tile::{EDGE, Tile};
+use crate::tile::Tile;
 use crate::vector::{Frame, Vector, three, two};
 
 /// A shape in its own frame; its axis is z.
@@ -45,11 +47,11 @@ impl Solid {
         }
     }
 
-    /// Shows it, number `thing`, in a tile.
+    /// Shows it, number `thing`, in lines of a tile.
     #[inline(always)]
-    pub(crate) fn fill(&self, frame: &Frame, thing: u32, tile: &mut Tile) {
+    pub(crate) fn fill(&self, frame: &Frame, thing: u32, lines: Range<usize>, tile: &mut Tile) {
         let origin = frame.turn_back(three!(k => -frame.pos[k]));
-        for line in 0..EDGE {
+        for line in lines {
             let far = self.enter(origin, &tile.directions(frame, line));
             tile.keep(line, far, F32x8::all(), thing, 0);
         }

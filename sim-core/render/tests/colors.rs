@@ -247,6 +247,28 @@ fn height_fields_look_like_their_triangles() {
 }
 
 #[test]
+fn many_parts_at_rest_look_as_few_do() {
+    let rng = &mut Rng::with_seed(6);
+    let mut counts = Counts::default();
+    for scene in 0..20 {
+        let count = rng.usize(20..150) as i32;
+        let mut parts: Vec<Seen> = (0..count).map(|label| part(rng, label)).collect();
+        for seen in &mut parts[2..] {
+            // of which those of triangles are one thing, and the others are in a tree
+            seen.part.body = None;
+            seen.part.pose = seen.body;
+            seen.body = Pose::identity();
+        }
+        parts[1].body = parts[0].body;
+        parts.push(floor());
+        let key = (scene % 2 == 0).then(|| [rng.f64() - 0.5, rng.f64() - 0.5, 0.3]);
+        let camera = Camera::with_fov(rng.usize(1..80), rng.usize(1..60), 0.9, 100.0);
+        counts.compare(&parts, key, &eye(rng, 2.8), &camera);
+    }
+    counts.check();
+}
+
+#[test]
 fn a_transparent_part_is_not_seen_and_casts_no_shadow() {
     let Some(draw) = draw() else {
         return;

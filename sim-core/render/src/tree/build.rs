@@ -2,7 +2,7 @@
 
 use sim_model::geometry::vector::{Vector as Point, cross, dot, sub};
 
-use super::{LEAF, Leaf, Node, STACK, Tree};
+use super::{LEAF, Leaf, Node, PartTree, STACK, Tree};
 use crate::vector::Vector;
 
 /// Triangles of a leaf.
@@ -91,15 +91,50 @@ impl Tree {
                 .map(|k| (all.high[k] - about[k]).max(about[k] - all.low[k]))
                 .map(|half| ((1.0 + MARGIN) * half.max(0.0)) as f32),
         };
-        if !items.is_empty() {
-            let root = halve(&mut items, 0);
-            tree.add(root, &moved);
-        }
+        let grown = Grown::new(&mut items);
+        tree.nodes = grown.nodes;
+        tree.leaves = grown.leaves.iter().map(|all| leaf(all, &moved)).collect();
         (tree, center)
+    }
+}
+
+impl PartTree {
+    /// The tree of boxes, by their lowest and highest corners [m].
+    pub(crate) fn new(boxes: &[[Point; 2]]) -> PartTree {
+        let items = boxes.iter().enumerate().map(|(number, &[low, high])| Item {
+            bounds: Bounds { low, high },
+            center: [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])),
+            number,
+        });
+        let grown = Grown::new(&mut items.collect::<Vec<Item>>());
+        let reach = boxes.iter().flatten().flatten().map(|x| x.abs());
+        PartTree {
+            nodes: grown.nodes,
+            leaves: grown.leaves,
+            reach: reach.fold(0.0, f64::max) as f32,
+        }
+    }
+}
+
+/// Nodes, and the numbers of what is in each leaf.
+#[derive(Default)]
+struct Grown {
+    nodes: Vec<Node>,
+    leaves: Vec<Vec<usize>>,
+}
+
+impl Grown {
+    fn new(items: &mut [Item]) -> Grown {
+        let mut grown = Grown::default();
+        if !items.is_empty() {
+            let root = halve(items, 0);
+            grown.add(root);
+        }
+        grown
     }
 
     /// Adds a node with all below; returns its place.
-    fn add(&mut self, half: Half, triangles: &[[Point; 3]]) -> u32 {
+    fn add(&mut self, half: Half) -> u32 {
         let mut children = vec![half];
         // opens the child with the largest surface, as long as there is room
         while children.len() < WIDTH {
@@ -123,10 +158,10 @@ impl Tree {
             let bounds = *child.bounds();
             let at = match child {
                 Half::Leaf(_, numbers) => {
-                    self.leaves.push(leaf(&numbers, triangles));
+                    self.leaves.push(numbers);
                     LEAF | (self.leaves.len() - 1) as u32
                 }
-                inner @ Half::Inner(..) => self.add(inner, triangles),
+                inner @ Half::Inner(..) => self.add(inner),
             };
             let node = &mut self.nodes[place];
             for k in 0..3 {

@@ -7,14 +7,14 @@ use super::{LEAF, Leaf, Node, STACK, Tree};
 use crate::vector::{Vector, dot, three};
 
 /// Rounding of a sum of three products, relative to their size, and then some.
-const ROUNDING: f32 = 4.0 * f32::EPSILON;
+pub(super) const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Where rays of one camera begin in the frame of a tree, and how far roundings reach there.
 #[derive(Clone, Copy)]
 pub(crate) struct Origin {
-    pub(super) pos: Vector,
+    pub(crate) pos: Vector,
     /// By how much coordinates of points on triangles may be off [m].
-    pub(super) slack: f32,
+    pub(crate) slack: f32,
 }
 
 /// Children that wait on the way down, each with the distance at which a ray enters it.
@@ -212,7 +212,7 @@ impl Ray {
 }
 
 #[inline(always)]
-fn length(v: Vector) -> f32 {
+pub(super) fn length(v: Vector) -> f32 {
     dot(v, v).sqrt()
 }
 

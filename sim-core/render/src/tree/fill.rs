@@ -32,7 +32,7 @@ pub(crate) struct Waiting {
 }
 
 /// Four planes through the camera, beside the rays of a tile, and the direction in which it looks.
-struct Bundle {
+pub(crate) struct Bundle {
     sides: [Vector; 4],
     /// Products of the sides and the place of the camera, and how far they may be off.
     heights: [f32; 4],
@@ -119,7 +119,7 @@ impl Tree {
 
 impl Bundle {
     #[inline(always)]
-    fn new(frame: &Frame, origin: &Origin, tile: &Tile) -> Bundle {
+    pub(crate) fn new(frame: &Frame, origin: &Origin, tile: &Tile) -> Bundle {
         let ([left, right], [top, bottom]) =
             ([tile.x[0], tile.x[EDGE - 1]], [tile.y[0], tile.y[EDGE - 1]]);
         // rays inside have positive products with them
@@ -153,7 +153,7 @@ impl Bundle {
 
     /// Least depths of the boxes of a node, and which may be seen.
     #[inline(always)]
-    fn boxes(&self, node: &Node, farthest: f32) -> ([f32; 8], u32) {
+    pub(super) fn boxes(&self, node: &Node, farthest: f32) -> ([f32; 8], u32) {
         let least = corner(node, self.forward, -1.0) - F32x8::k(self.height);
         let mut is_outside = F32x8::k(farthest).lt(least);
         for side in 0..4 {

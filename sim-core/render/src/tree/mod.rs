@@ -14,9 +14,12 @@
 mod build;
 mod cast;
 mod fill;
+mod parts;
 mod shade;
 
-pub(crate) use fill::Waiting;
+pub(crate) use fill::{Bundle, Waiting};
+pub(crate) use parts::{PartTree, Walk};
+pub(crate) use shade::Beam;
 
 use crate::vector::Vector;
 

@@ -16,7 +16,7 @@ use sim_physics::lane::{Lane, Num};
 use super::cast::Origin;
 use super::fill::{Waiting, corner, turned, value};
 use super::{LEAF, Leaf, Node, Tree};
-use crate::shadow::Few;
+use crate::lit::Few;
 use crate::tile::EDGE;
 use crate::vector::{Frame, Vector, three};
 
@@ -27,7 +27,7 @@ const FEW: usize = 4;
 
 /// What is over a rectangle, as seen from a light: rays inside have products with these directions that are at least so
 /// large, in the frame of a tree.
-struct Beam {
+pub(crate) struct Beam {
     sides: [Vector; 5],
     least: [f32; 5],
 }
@@ -42,7 +42,7 @@ impl Tree {
         let slack = self
             .origin_at(frame.turn_back(three!(k => -frame.pos[k])))
             .slack;
-        let beam = Beam::new(frame, slack, few);
+        let beam = Beam::new(frame, slack, few.all, few.deep);
         let most = LEAVES_MAX + few.count;
         if few.count <= FEW || !self.leaves_over(&beam, most, waiting) {
             return self.shade_by_ray(frame, slack, waiting, few);
@@ -103,16 +103,21 @@ impl Tree {
 
 impl Beam {
     #[inline(always)]
-    fn new(frame: &Frame, slack: f32, few: &Few) -> Beam {
+    pub(crate) fn new(
+        frame: &Frame,
+        slack: f32,
+        [a_ends, b_ends]: [[f32; 2]; 2],
+        deep: f32,
+    ) -> Beam {
         let [a, b, c] = frame.rot;
         let sides = [a, three!(k => -a[k]), b, three!(k => -b[k]), c];
         let [x, y, z] = frame.pos;
         let least = [
-            few.all[0][0] - x,
-            x - few.all[0][1],
-            few.all[1][0] - y,
-            y - few.all[1][1],
-            few.deep - z,
+            a_ends[0] - x,
+            x - a_ends[1],
+            b_ends[0] - y,
+            y - b_ends[1],
+            deep - z,
         ];
         Beam {
             sides,
@@ -124,7 +129,7 @@ impl Beam {
 
     /// Which boxes of a node are in it.
     #[inline(always)]
-    fn boxes(&self, node: &Node) -> u32 {
+    pub(super) fn boxes(&self, node: &Node) -> u32 {
         // boxes of no child are infinite, so that products with them may be NaN
         let mut is_in = F32x8::load(&node.low[0]).lt(F32x8::k(f32::INFINITY));
         for side in 0..5 {
