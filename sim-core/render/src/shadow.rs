@@ -194,6 +194,7 @@ impl Casters {
 
 impl Below {
     /// Shades the points of lines that are below a caster.
+    #[inline]
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn shade(
         &mut self,

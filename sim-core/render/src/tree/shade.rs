@@ -82,6 +82,7 @@ impl Tree {
         true
     }
 
+    #[inline(never)]
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     fn shade_by_ray(&self, frame: &Frame, slack: f32, waiting: &mut Waiting, few: &mut Few) {
         let direction = frame.rot[2];
@@ -158,6 +159,9 @@ impl Leaf {
         };
         let mut is_any = false;
         for group in 0..few.in_use() {
+            if !F32x8::any(F32x8::load(&few.groups[group][2]).lt(F32x8::k(f32::INFINITY))) {
+                continue;
+            }
             let mut bits = front & cast.over(&few.bounds[group]);
             let [a, b, c] = &mut few.groups[group];
             let (a, b) = (F32x8::load(a), F32x8::load(b));
