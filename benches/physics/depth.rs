@@ -1,7 +1,8 @@
 //! Images per second of one core: depth, with labels, and with colours, of 64 × 64 pixels.
 //!
-//! `cargo bench --package sim-render -- [robot.urdf [subdivisions]]`: each subdivision makes four triangles of one. The robot
-//! is over a table, with joints bent as in the lesson. The other scenes are a humanoid on rough ground, and many boxes.
+//! `cargo bench --package sim-render --bench depth -- [robot.urdf [subdivisions]]`: each subdivision makes four triangles of
+//! one. The robot is over a table, with joints bent as in the lesson. The other scenes are a humanoid on rough ground, and
+//! many boxes. With the variable `IMAGES`, a folder, the images of colours are written there.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -146,10 +147,6 @@ const KINDS: [(&str, [bool; 3]); 4] = [
 ];
 
 fn measure(draw: Draw, name: &str, parts: &[Part], bodies: &[Frame], eye: &Frame) {
-    if std::env::var("ONLY").is_ok_and(|only| !name.contains(&only)) {
-        return;
-    }
-    let kinds = std::env::var("KINDS").map_or(15, |k| k.parse::<u32>().unwrap());
     let began = Instant::now();
     let scene = Scene::new(parts);
     let built = began.elapsed();
@@ -164,12 +161,6 @@ fn measure(draw: Draw, name: &str, parts: &[Part], bodies: &[Frame], eye: &Frame
     for _ in 0..ROUNDS {
         for (best, (_, [with_labels, with_rgb, with_shadows])) in best.iter_mut().zip(KINDS) {
             let scene = &scenes[usize::from(with_shadows)];
-            let kind = usize::from(with_labels)
-                + 2 * usize::from(with_rgb && !with_shadows)
-                + 3 * usize::from(with_shadows);
-            if kinds >> kind & 1 == 0 {
-                continue;
-            }
             let (began, mut images) = (Instant::now(), 0);
             while began.elapsed() < ROUND {
                 let mut image = Image {

@@ -343,10 +343,15 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/render/src",
         &[
-            "vector", "camera", "tile", "tree", "solids", "scene", "image",
+            "vector", "camera", "tile", "lit", "tree", "solids", "normals", "parallel", "paint",
+            "light", "field", "scene", "shadow", "shade", "image",
         ],
     ),
-    ("sim-core/render/src/tree", &["build", "cast", "fill"]),
+    ("sim-core/render/src/field", &["march", "normals"]),
+    (
+        "sim-core/render/src/tree",
+        &["build", "cast", "fill", "shade", "parts"],
+    ),
     ("sim-daemon/src/export", &["refusal", "snapshot", "arrays"]),
     (
         "sim-daemon/src/serve",

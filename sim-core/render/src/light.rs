@@ -16,7 +16,7 @@ use crate::vector::Frame;
 /// Where the key light comes from, in the world.
 const KEY: [f64; 3] = [0.33, -0.52, 0.79];
 /// Where the fill light comes from, in the frame of a camera, with length 1.
-pub(crate) const FILL: [f32; 3] = [0.751_882_06, -0.100_250_94, -0.651_631_1];
+pub(crate) const FILL: [f32; 3] = [0.751_882_1, -0.100_250_94, -0.651_631_1];
 /// What all surfaces reflect of light from everywhere, and more of it the more they look up [–].
 pub(crate) const AMBIENT: f32 = 0.22;
 pub(crate) const UPWARD: f32 = 0.24;

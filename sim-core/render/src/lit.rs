@@ -108,7 +108,8 @@ impl Columns {
 fn least(x: F32x8) -> f32 {
     let mut lanes = [0.0; EDGE];
     x.store(&mut lanes);
-    lanes.into_iter().fold(f32::INFINITY, f32::min)
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k: usize| lanes[k].min(lanes[k + 4]));
+    a.min(b).min(c.min(d))
 }
 
 /// Points that a tree may shade, close together.
@@ -157,36 +158,39 @@ impl Few {
 
     #[inline(always)]
     pub(crate) fn gather(&mut self, lit: &Lit, chosen: &[u32; EDGE]) {
-        let endless = [f32::INFINITY, f32::NEG_INFINITY];
-        (self.count, self.all, self.deep) = (0, [endless; 2], f32::INFINITY);
+        self.count = 0;
         for line in 0..EDGE {
             let mut bits = chosen[line];
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize & (EDGE - 1);
                 bits &= bits - 1;
+                let place = self.count % EDGE;
+                let group = &mut self.groups[self.count / EDGE % EDGE];
                 let point = [lit.a[line][lane], lit.b[line][lane], lit.c[line][lane]];
-                let (group, place) = (self.count / EDGE % EDGE, self.count % EDGE);
                 if place == 0 {
-                    self.groups[group][2] = [f32::INFINITY; EDGE];
-                    self.bounds[group] = [endless; 2];
+                    // what is behind the last point is as the first, and shaded
+                    *group = [[point[0]; EDGE], [point[1]; EDGE], [f32::INFINITY; EDGE]];
                 }
                 for k in 0..3 {
-                    self.groups[group][k][place] = point[k];
+                    group[k][place] = point[k];
                 }
-                for k in 0..2 {
-                    let [low, high] = self.bounds[group][k];
-                    self.bounds[group][k] = [low.min(point[k]), high.max(point[k])];
-                }
-                self.deep = self.deep.min(point[2]);
                 self.places[self.count % (EDGE * EDGE)] = (EDGE * line + lane) as u8;
                 self.count += 1;
             }
         }
+        (self.all, self.deep) = ([[f32::INFINITY, f32::NEG_INFINITY]; 2], f32::INFINITY);
         for group in 0..self.in_use() {
+            let [a, b, c] = &self.groups[group];
+            let ends = two!(k => {
+                let places = F32x8::load([a, b][k]);
+                [least(places), -least(-places)]
+            });
             for k in 0..2 {
-                let ([low, high], [least, most]) = (self.all[k], self.bounds[group][k]);
-                self.all[k] = [low.min(least), high.max(most)];
+                let [low, high] = self.all[k];
+                self.all[k] = [low.min(ends[k][0]), high.max(ends[k][1])];
             }
+            self.deep = self.deep.min(least(F32x8::load(c)));
+            self.bounds[group] = ends;
         }
     }
 

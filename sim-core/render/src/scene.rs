@@ -41,7 +41,7 @@ pub struct Part {
     pub look: Look,
     /// What segmentation calls it.
     pub label: i32,
-    /// Its colours.
+    /// Its colours. There are no images on surfaces: of a texture, models keep the mean colour or the file.
     pub paint: Paint,
 }
 
@@ -134,7 +134,7 @@ impl Scene {
                         });
                         meshes.len() - 1
                     });
-                    meshes[joined].add(&mesh, part);
+                    meshes[joined].add(mesh, part);
                 }
             }
         }

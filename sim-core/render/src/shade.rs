@@ -84,6 +84,10 @@ impl Lights {
             if seen != 0xff {
                 is_lit = is_lit & mask(seen);
             }
+            if !F32x8::any(is_lit) {
+                shown.lit.c[line] = [f32::INFINITY; EDGE];
+                continue;
+            }
             let depth = F32x8::load(&tile.depth[line]);
             let towards = turned_back(&self.key, &d);
             let place = three!(k => towards[k] * depth);

@@ -307,7 +307,7 @@ fn a_transparent_part_is_not_seen_and_casts_no_shadow() {
 }
 
 #[test]
-fn colours_change_no_depth_and_are_the_same_after_any_other_image() {
+fn colours_change_no_depth_and_are_the_same_after_any_image_on_any_thread() {
     let Some(draw) = draw() else {
         return;
     };
@@ -338,4 +338,15 @@ fn colours_change_no_depth_and_are_the_same_after_any_other_image() {
         assert_eq!(depth, alone[usize::from(k)].0);
         assert_eq!(drawn(scratch, true, f64::from(k)), alone[usize::from(k)]);
     }
+    let (drawn, alone) = (&drawn, &alone);
+    std::thread::scope(|scope| {
+        for worker in 0..4 {
+            scope.spawn(move || {
+                let scratch = &mut Scratch::default();
+                for k in (0..5_u8).map(|k| (k * (worker + 1)) % 5) {
+                    assert_eq!(drawn(scratch, true, f64::from(k)), alone[usize::from(k)]);
+                }
+            });
+        }
+    });
 }
