@@ -27,6 +27,8 @@ const LEAVES_MAX: usize = 64;
 #[derive(Default)]
 pub(crate) struct Waiting {
     pub(super) stack: Stack,
+    /// Leaves that a tile may see, with their least depths.
+    near: Vec<(f32, u32)>,
     /// Leaves that points may be below.
     pub(super) leaves: Vec<u32>,
 }
@@ -50,41 +52,49 @@ impl Tree {
         }
         let origin = self.origin_at(frame.turn_back(three!(k => -frame.pos[k])));
         let bundle = Bundle::new(frame, &origin, tile);
-        let stack = &mut waiting.stack.0;
-        let (mut count, mut leaves) = (1, 0);
-        stack[0] = (f32::NEG_INFINITY, 0);
-        let mut farthest = tile.farthest();
+        if !self.leaves_of(&bundle, waiting, tile.farthest()) {
+            self.fill_by_ray(frame, &origin, thing, waiting, tile);
+            return;
+        }
+        let mut farthest = f32::INFINITY;
+        for &(near, leaf) in &waiting.near {
+            if near < farthest {
+                self.leaves[leaf as usize].fill(frame, &origin, thing, tile);
+                farthest = tile.farthest();
+            }
+        }
+    }
+
+    /// Finds the leaves that a tile may see, the nearest first; false if there are too many.
+    #[inline(always)]
+    fn leaves_of(&self, bundle: &Bundle, waiting: &mut Waiting, farthest: f32) -> bool {
+        let (stack, leaves) = (&mut waiting.stack.0, &mut waiting.near);
+        leaves.clear();
+        let mut count = 1;
+        stack[0] = (0.0, 0);
         while count > 0 {
             count -= 1;
-            let (near, at) = stack[count];
-            if near > farthest {
-                continue;
-            }
-            if at & LEAF != 0 {
-                if leaves == LEAVES_MAX {
-                    return self.fill_by_ray(frame, &origin, thing, waiting, tile);
-                }
-                leaves += 1;
-                self.leaves[(at & !LEAF) as usize].fill(frame, &origin, thing, tile);
-                farthest = tile.farthest();
-                continue;
-            }
-            let node = &self.nodes[at as usize];
+            let node = &self.nodes[stack[count].1 as usize];
             let (near, mut bits) = bundle.boxes(node, farthest);
-            let first = count;
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize & 7;
                 bits &= bits - 1;
-                // the nearest child ends on top
-                let mut place = count;
-                while place > first && stack[place - 1].0 < near[lane] {
-                    stack[place] = stack[place - 1];
-                    place -= 1;
+                let (near, child) = (near[lane], node.children[lane]);
+                if child & LEAF == 0 {
+                    stack[count] = (near, child);
+                    count += 1;
+                } else if leaves.len() == LEAVES_MAX {
+                    return false;
+                } else {
+                    let place = leaves
+                        .iter()
+                        .rposition(|other| other.0 <= near)
+                        .map_or(0, |before| before + 1);
+                    leaves.insert(place, (near, child & !LEAF));
                 }
-                stack[place] = (near[lane], node.children[lane]);
-                count += 1;
             }
         }
+        true
     }
 
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
