@@ -2,15 +2,14 @@
 //! sky, as in our pictures and films.
 //!
 //! ```text
-//! light = colour (0.22 + 0.24 (1 + n·z)/2 + 0.66 max(n·k, 0) s + 0.14 max(n·f, 0)) + 0.1 max(n·h, 0)³² s
+//! light = colour² (0.22 + 0.24 (1 + n·z)/2 + 0.66 max(n·k, 0) s + 0.14 max(n·f, 0)),  byte = 255 √light
 //! ```
 //!
-//! n is the normal, z up in the world, k and f where key and fill light come from, h the middle between k and the eye. s is 1
-//! where the key light arrives, else 0.
+//! n is the normal of a face, z up in the world, k and f where key and fill light come from. s is 1 where the key light
+//! arrives, else 0. There are no highlights.
 
 use sim_model::geometry::vector::{Vector as Point, cross, dot};
 
-use crate::paint::{Light, light_of};
 use crate::vector::Frame;
 
 /// Where the key light comes from, in the world.
@@ -23,12 +22,20 @@ pub(crate) const UPWARD: f32 = 0.24;
 /// Of the key light and the fill light, where they fall straight on a surface [–].
 pub(crate) const BRIGHT: f32 = 0.66;
 pub(crate) const FILLED: f32 = 0.14;
-/// Light of a highlight, whatever the colour [–].
-pub(crate) const GLEAM: f32 = 0.10;
 /// Behind everything: at the horizon and below, and from this sine of the elevation on.
-pub(crate) const HORIZON: Light = light_of([226, 230, 236]);
-pub(crate) const SKY: Light = light_of([250, 251, 253]);
+pub(crate) const HORIZON: [f32; 3] = light_of([226, 230, 236]);
+pub(crate) const SKY: [f32; 3] = light_of([250, 251, 253]);
 pub(crate) const HIGH: f32 = 0.6;
+
+/// The light that bytes stand for.
+const fn light_of([red, green, blue]: [u8; 3]) -> [f32; 3] {
+    const SCALE: f32 = 1.0 / (255.0 * 255.0);
+    [
+        red as f32 * red as f32 * SCALE,
+        green as f32 * green as f32 * SCALE,
+        blue as f32 * blue as f32 * SCALE,
+    ]
+}
 
 fn norm(v: Point) -> f64 {
     dot(v, v).sqrt()

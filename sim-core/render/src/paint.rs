@@ -1,4 +1,4 @@
-//! Colours of parts, and the light that they stand for.
+//! Colours of parts.
 //!
 //! A byte of an image is the square root of light, as in our pictures and films: `byte = 255 √light`. A square root is
 //! correctly rounded everywhere, unlike the powers of sRGB, from which it differs by at most 0.04.
@@ -20,8 +20,8 @@ const STEEP: [f64; 3] = [
 ];
 const TONES: [[f32; 2]; 4] = [[1.0, 0.93], [0.92, 0.86], [0.78, 0.78], [0.66, 0.66]];
 
-/// Amounts of red, green and blue light [–].
-pub(crate) type Light = [f32; 3];
+/// Red, green and blue from 0 to 1, as a screen shows them [–].
+pub(crate) type Color = [f32; 3];
 
 /// What the surface of a part looks like in an image of colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,9 +60,9 @@ impl Paint {
         self.color[3] >= OPAQUE_MIN
     }
 
-    /// Light that it reflects, in a tone.
-    pub(crate) fn light(&self, tone: f32) -> Light {
-        [0, 1, 2].map(|k| light(tone * self.color[k]))
+    /// Its colour in a tone.
+    pub(crate) fn toned(&self, tone: f32) -> Color {
+        [0, 1, 2].map(|k| (tone * self.color[k]).clamp(0.0, 1.0))
     }
 
     /// How a plane with these half edges [m] is painted.
@@ -71,7 +71,7 @@ impl Paint {
             return self.on_solid();
         }
         Coat {
-            tones: [1.0 + CONTRAST, 1.0 - CONTRAST].map(|tone| self.light(tone)),
+            tones: [1.0 + CONTRAST, 1.0 - CONTRAST].map(|tone| self.toned(tone)),
             // an even number of equal squares along an edge
             per: half.map(|half| {
                 let per = match half.is_finite() {
@@ -86,20 +86,20 @@ impl Paint {
     /// How a shape with one tone is painted.
     pub(crate) fn on_solid(&self) -> Coat {
         Coat {
-            tones: [self.light(1.0); 2],
+            tones: [self.toned(1.0); 2],
             per: [0.0; 2],
         }
     }
 
-    /// Light that walls of height fields reflect.
-    pub(crate) fn wall(&self) -> Light {
-        self.light(if self.squares { TONES[3][0] } else { 1.0 })
+    /// The colour of walls of height fields.
+    pub(crate) fn wall(&self) -> Color {
+        self.toned(if self.squares { TONES[3][0] } else { 1.0 })
     }
 
-    /// Light that a triangle of a height field reflects.
-    pub(crate) fn on_field(&self, field: &HeightField, corners: &[Point; 3]) -> Light {
+    /// The colour of a triangle of a height field.
+    pub(crate) fn on_field(&self, field: &HeightField, corners: &[Point; 3]) -> Color {
         if !self.squares {
-            return self.light(1.0);
+            return self.toned(1.0);
         }
         let [a, b, c] = *corners;
         let normal = cross(sub(b, a), sub(c, a));
@@ -111,7 +111,7 @@ impl Paint {
             ((middle + field.half[k]) / squares[k]).floor()
         });
         let is_dark = (place[0] + place[1]).rem_euclid(2.0) > 0.5;
-        self.light(TONES[steep.count()][usize::from(is_dark)])
+        self.toned(TONES[steep.count()][usize::from(is_dark)])
     }
 }
 
@@ -125,24 +125,9 @@ impl Default for Paint {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coat {
     /// Of its two kinds of squares.
-    pub(crate) tones: [Light; 2],
+    pub(crate) tones: [Color; 2],
     /// Squares per length along x and y; 0 where it has one tone [1/m].
     pub(crate) per: [f32; 2],
-}
-
-/// What a part of a colour, as a screen shows it, stands for.
-pub(crate) const fn light(part: f32) -> f32 {
-    let part = part.clamp(0.0, 1.0);
-    part * part
-}
-
-/// What bytes stand for.
-pub(crate) const fn light_of([red, green, blue]: [u8; 3]) -> Light {
-    [
-        light(red as f32 / 255.0),
-        light(green as f32 / 255.0),
-        light(blue as f32 / 255.0),
-    ]
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use sim_model::geometry::{HeightField, Shape, TriMesh};
 
 use crate::field::Field;
 use crate::light::KeyLight;
-use crate::paint::{Coat, Light, Paint};
+use crate::paint::{Coat, Color, Paint};
 use crate::solids::Solid;
 use crate::tree::{PartTree, Tree};
 use crate::vector::{Frame, Vector};
@@ -66,8 +66,8 @@ pub(crate) enum Surface {
         tree: Tree,
         labels: Vec<i32>,
         faces: Vec<Face>,
-        /// Light that faces reflect.
-        tones: Vec<Light>,
+        /// Colours of faces.
+        tones: Vec<Color>,
     },
     Field {
         field: Field,
@@ -184,15 +184,15 @@ struct Joined {
     body: Option<usize>,
     triangles: Vec<[Point; 3]>,
     labels: Vec<i32>,
-    tones: Vec<Light>,
+    tones: Vec<Color>,
     /// Of each triangle, its tone.
     chosen: Vec<u32>,
 }
 
 impl Joined {
     fn add(&mut self, mesh: &TriMesh, part: &Part) {
-        let tone = part.paint.light(1.0);
-        let same = |other: &Light| other.map(f32::to_bits) == tone.map(f32::to_bits);
+        let tone = part.paint.toned(1.0);
+        let same = |other: &Color| other.map(f32::to_bits) == tone.map(f32::to_bits);
         let place = self.tones.iter().position(same).unwrap_or_else(|| {
             self.tones.push(tone);
             self.tones.len() - 1

@@ -3,7 +3,7 @@
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
-use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, GLEAM, HIGH, HORIZON, SKY, UPWARD};
+use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, HIGH, HORIZON, SKY, UPWARD};
 use crate::lit::Lit;
 use crate::normals::{Points, mask, turned, turned_back};
 use crate::scene::{Scene, Surface};
@@ -108,46 +108,34 @@ impl Lights {
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
     pub(crate) fn line(&self, tile: &Tile, shown: &Shown, line: usize) -> [[u8; 3]; EDGE] {
         let (zero, one) = (F32x8::k(0.0), F32x8::k(1.0));
-        let d = tile.rays(line);
-        // one over the length of a ray
-        let scale = one.div(squares(&d).sqrt());
-        let mut light = [zero; 3];
+        let mut shares = [zero; 3];
         if shown.seen[line] != 0xff {
-            let t = (products(&d, self.up) * scale * F32x8::k(1.0 / HIGH))
-                .max(zero)
-                .min(one);
+            let d = tile.rays(line);
+            let sine = products(&d, self.up).div(squares(&d).sqrt());
+            let t = (sine * F32x8::k(1.0 / HIGH)).max(zero).min(one);
             let share = t * t * (F32x8::k(3.0) - t - t);
-            light = three!(k => share.fma(F32x8::k(SKY[k] - HORIZON[k]), F32x8::k(HORIZON[k])));
+            shares = three!(k => {
+                let light = share.fma(F32x8::k(SKY[k] - HORIZON[k]), F32x8::k(HORIZON[k]));
+                light.sqrt()
+            });
         }
         if shown.seen[line] != 0 {
             let n = three!(k => F32x8::load(&shown.normals[line][k]));
             let fill = products(&n, FILL).max(zero);
             let upward =
                 products(&n, self.up).fma(F32x8::k(0.5 * UPWARD), F32x8::k(AMBIENT + 0.5 * UPWARD));
-            let mut amount = fill.fma(F32x8::k(FILLED), upward);
-            let mut gleam = zero;
+            let around = fill.fma(F32x8::k(FILLED), upward);
             let arrives = F32x8::load(&shown.lit.c[line]).lt(F32x8::k(f32::INFINITY));
-            if F32x8::any(arrives) {
-                let key = self.direction();
-                let facing = F32x8::select(arrives, products(&n, key), zero);
-                amount = facing.fma(F32x8::k(BRIGHT), amount);
-                // n·h with h = (k - r) / |k - r|
-                let square = F32x8::k(2.0) - F32x8::k(2.0) * scale * products(&d, key);
-                let along = n[2].fma(d[2], n[1].fma(d[1], n[0] * d[0]));
-                let middle = (facing - along * scale).max(zero);
-                let square = (middle * middle).div(square.max(F32x8::k(1e-12)));
-                let fourth = square * square;
-                let eighth = fourth * fourth;
-                let sixteenth = eighth * eighth;
-                gleam = F32x8::select(arrives, sixteenth * sixteenth * F32x8::k(GLEAM), zero);
-            }
-            let seen = three!(k => F32x8::load(&shown.colors[line][k]).fma(amount, gleam));
-            light = match shown.seen[line] {
+            let facing = F32x8::select(arrives, products(&n, self.direction()), zero);
+            // √(colour² amount)
+            let root = facing.fma(F32x8::k(BRIGHT), around).sqrt();
+            let seen = three!(k => F32x8::load(&shown.colors[line][k]) * root);
+            shares = match shown.seen[line] {
                 0xff => seen,
-                some => three!(k => F32x8::select(mask(some), seen[k], light[k])),
+                some => three!(k => F32x8::select(mask(some), seen[k], shares[k])),
             };
         }
-        bytes(&light)
+        bytes(&shares)
     }
 }
 
@@ -251,14 +239,13 @@ fn is_dark(per: [f32; 2], p: &Points) -> Mask {
 /// From here on, floats are the whole numbers, in order: the last bits of a sum with it are those of the rounded number.
 const WHOLE: f32 = 8_388_608.0;
 
-/// Bytes of light, the same on every processor: a square root is correctly rounded.
+/// Bytes of shares of the brightest, the same on every processor.
 #[inline(always)]
-fn bytes(light: &Points) -> [[u8; 3]; EDGE] {
+fn bytes(shares: &Points) -> [[u8; 3]; EDGE] {
     let mut lanes = [[0.0; EDGE]; 3];
     for k in 0..3 {
-        let share = light[k].max(F32x8::k(0.0)).min(F32x8::k(1.0));
+        let share = shares[k].max(F32x8::k(0.0)).min(F32x8::k(1.0));
         share
-            .sqrt()
             .fma(F32x8::k(255.0), F32x8::k(WHOLE))
             .store(&mut lanes[k]);
     }

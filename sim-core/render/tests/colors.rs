@@ -5,7 +5,7 @@ mod random;
 use fastrand::Rng;
 use random::{Seen, field, frame, part, rotation};
 use sim_model::Pose;
-use sim_model::geometry::vector::{Vector, dot, sub};
+use sim_model::geometry::vector::{Vector, dot};
 use sim_model::geometry::{RayShape, Shape};
 use sim_render::{Camera, Frame, Image, KeyLight, Look, Paint, Part, Scene, Scratch, draw};
 
@@ -88,9 +88,7 @@ fn reference(parts: &[Seen], eye: &Pose, tip: Vector, key: Option<Vector>) -> [f
     let arrives = f64::from(facing > 0.0 && !is_stopped(parts, start, towards));
     let fill = dot(n, unit(eye.rotate(FILL))).max(0.0);
     let amount = 0.22 + 0.24 * (0.5 + 0.5 * n[2]) + 0.66 * facing * arrives + 0.14 * fill;
-    let half = unit(sub(towards, ray));
-    let gleam = 0.1 * dot(n, half).max(0.0).powi(32) * arrives;
-    light(&parts[number], at).map(|part| 255.0 * (part * amount + gleam).clamp(0.0, 1.0).sqrt())
+    light(&parts[number], at).map(|part| 255.0 * (part * amount).clamp(0.0, 1.0).sqrt())
 }
 
 fn is_near(ours: &[u8], expected: [f64; 3]) -> bool {

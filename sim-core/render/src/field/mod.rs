@@ -12,7 +12,7 @@ mod normals;
 
 use sim_model::geometry::HeightField;
 
-use crate::paint::{Light, Paint};
+use crate::paint::{Color, Paint};
 use crate::vector::Vector;
 
 /// Cells along an edge of a block.
@@ -35,8 +35,8 @@ pub(crate) struct Field {
     /// Of each block of cells [m].
     block_tops: Vec<f32>,
     blocks_across: usize,
-    /// Light that triangles reflect, two of each cell; and the light of walls.
-    tones: Vec<Light>,
+    /// Colours of triangles, two of each cell, and then that of walls.
+    tones: Vec<Color>,
     chosen: Vec<u8>,
 }
 
@@ -85,7 +85,7 @@ impl Field {
             };
             for triangle in [[0, 1, 3], [0, 3, 2]] {
                 let tone = paint.on_field(field, &triangle.map(at));
-                let same = |other: &Light| other.map(f32::to_bits) == tone.map(f32::to_bits);
+                let same = |other: &Color| other.map(f32::to_bits) == tone.map(f32::to_bits);
                 // a field has at most eight
                 let place = tones.iter().position(same).unwrap_or_else(|| {
                     tones.push(tone);
@@ -119,9 +119,9 @@ impl Field {
         (field, center)
     }
 
-    /// Light that a triangle or wall reflects.
+    /// The colour of a triangle or wall.
     #[inline(always)]
-    pub(crate) fn tone(&self, number: u32) -> Light {
+    pub(crate) fn tone(&self, number: u32) -> Color {
         let last = self.tones.len() - 1;
         let chosen = self
             .chosen
