@@ -1,7 +1,7 @@
 //! Images of cameras in many worlds: rays against the shapes of a model, on the CPU.
 //!
-//! scene (what is seen, per body) → image (tiles, and what each may see) → tree and solids (where rays meet it) → shade (in
-//! what light), with shadows by rays to the light (shadow, parallel)
+//! scene (what is seen, per body) → image (tiles, and what each may see) → tree, field and solids (where rays meet it) →
+//! shade (in what light), with shadow (which points of a tile, in the frame of the light, see it)
 //!
 //! An image depends on its world alone: its bits are the same for any number of worlds and threads.
 
