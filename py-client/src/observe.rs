@@ -7,7 +7,7 @@ use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, Field, Precision};
+use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, Field, Precision, Shows};
 
 use crate::errors::raise;
 
@@ -69,18 +69,25 @@ pub(crate) struct Playback {
 
 #[pymethods]
 impl Playback {
-    /// Frames of the first ``worlds`` of a recording.
+    /// Frames of the first ``worlds`` of a recording, with those of its starts if ``starts``.
     #[new]
+    #[pyo3(signature = (path, worlds, fields, *, starts = false, threads = None))]
     fn new(
         py: Python<'_>,
         path: PathBuf,
         worlds: usize,
         fields: Vec<String>,
+        starts: bool,
+        threads: Option<usize>,
     ) -> PyResult<Playback> {
         let fields = named(py, &fields)?;
-        let opened = py.detach(|| observe::Playback::open(&path, &fields, None));
+        let opened = py.detach(|| observe::Playback::open(&path, &fields, threads));
+        let opened = opened.map_err(|error| raised(py, &error))?;
         Ok(Playback {
-            inner: Mutex::new(opened.map_err(|error| raised(py, &error))?),
+            inner: Mutex::new(match starts {
+                true => opened.with_starts(),
+                false => opened,
+            }),
             worlds,
         })
     }
@@ -95,6 +102,22 @@ impl Playback {
     #[getter]
     fn note(&self, py: Python<'_>) -> Option<String> {
         lock(py, &self.inner).note().map(str::to_owned)
+    }
+
+    /// What the last frame shows: ``"start"``, ``"step"`` or ``"still"``.
+    #[getter]
+    fn shows(&self, py: Python<'_>) -> &'static str {
+        match lock(py, &self.inner).shows() {
+            Shows::Start => "start",
+            Shows::Step => "step",
+            Shows::Still => "still",
+        }
+    }
+
+    /// Names of the arrays that clients sent for the last frame, if it is a step.
+    #[getter]
+    fn sent(&self, py: Python<'_>) -> Vec<String> {
+        lock(py, &self.inner).sent().to_vec()
     }
 
     /// Why there are no more frames, once there are none.

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar, overload
+from typing import Any, Literal, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -318,14 +318,28 @@ class Playback:
         path: The file.
         worlds: Number of worlds in its frames: the first ones.
         fields: Fields of its frames, besides those of every frame.
+        starts: Whether the states at the beginning and behind gaps are frames, too.
+        threads: Most threads of a step; all cores if left out.
 
     Raises:
         RecordingError: The file cannot be read or is no recording, or files of its scene are missing.
         UnknownField: There is no such field.
     """
 
-    def __init__(self, path: str | os.PathLike[str], worlds: int, fields: Sequence[str]) -> None: ...
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        worlds: int,
+        fields: Sequence[str],
+        *,
+        starts: bool = False,
+        threads: int | None = None,
+    ) -> None: ...
     def describe(self) -> str: ...
+    @property
+    def shows(self) -> Literal["start", "step", "still"]: ...
+    @property
+    def sent(self) -> list[str]: ...
     @property
     def note(self) -> str | None: ...
     @property

@@ -10,4 +10,4 @@ pub use sim_physics::arrays::Field;
 pub use sim_protocol::Dtype;
 
 pub use crate::error::DaemonError;
-pub use crate::recording::Playback;
+pub use crate::recording::{Playback, Shows};

@@ -26,7 +26,7 @@ mod tests;
 mod writer;
 
 pub(crate) use entries::count_records;
-pub use playback::Playback;
+pub use playback::{Playback, Shows};
 #[cfg(test)]
 pub(crate) use record::follow;
 pub(crate) use record::run as record;

@@ -7,14 +7,26 @@ use std::path::Path;
 use sim_engine::options::{Adapter, cache_folder};
 use sim_engine::simulation::Device;
 use sim_physics::arrays::Field;
-use sim_protocol::Description;
+use sim_protocol::{Description, Op};
 
 use super::entries::{Entries, Entry};
 use super::failure::unreadable;
 use super::records::Record;
 use super::run::{Head, Run};
 use crate::error::DaemonError;
+use crate::export::Advance;
 use crate::export::arrays::Arrays;
+
+/// What a frame of a playback shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shows {
+    /// The state at the beginning of the recording, or behind a gap.
+    Start,
+    /// All worlds one control frame later.
+    Step,
+    /// Worlds at the same time, or put elsewhere: by a reset, a write, a restore.
+    Still,
+}
 
 /// A recording that is run again, frame after frame, without comparing them.
 pub struct Playback {
@@ -27,6 +39,11 @@ pub struct Playback {
     end: Option<String>,
     /// Entries that are missing here; none where frames follow one another.
     gap: Option<u64>,
+    /// Whether a state without a command is a frame, too.
+    has_starts: bool,
+    shows: Shows,
+    /// Arrays of the commands that led to the last frame.
+    sent: Vec<String>,
 }
 
 impl Playback {
@@ -73,7 +90,26 @@ impl Playback {
             note,
             end: None,
             gap: None,
+            has_starts: false,
+            shows: Shows::Start,
+            sent: Vec::new(),
         })
+    }
+
+    /// Also shows the states at the beginning and behind gaps, which no command made.
+    pub fn with_starts(mut self) -> Playback {
+        self.has_starts = true;
+        self
+    }
+
+    /// What the last frame shows.
+    pub fn shows(&self) -> Shows {
+        self.shows
+    }
+
+    /// Names of the arrays that clients sent for the last frame, if it is a step.
+    pub fn sent(&self) -> &[String] {
+        &self.sent
     }
 
     /// The daemon's description.
@@ -100,6 +136,7 @@ impl Playback {
             return Ok(None);
         }
         let path = self.entries.path.clone();
+        self.sent.clear();
         loop {
             let record = match self.entries.next()? {
                 Entry::Record(record) => record,
@@ -116,12 +153,26 @@ impl Playback {
                     self.run.has_state = false;
                 }
                 Record::State(state) => {
+                    let starts = !self.run.has_state;
                     self.run.restore(&path, state)?;
                     self.gap = None;
+                    if starts && self.has_starts {
+                        self.shows = Shows::Start;
+                        self.run.advance(Advance::Forward, self.arrays.arena());
+                        return Ok(Some(&self.arrays));
+                    }
                 }
                 Record::Command(command) if self.run.has_state => {
-                    if let Some(advance) = self.run.command(&path, &command, self.frames)? {
+                    let advance = self.run.command(&path, &command, self.frames)?;
+                    if self.run.op() == Op::Step {
+                        self.sent.extend(self.run.names());
+                    }
+                    if let Some(advance) = advance {
                         self.frames += 1;
+                        self.shows = match advance {
+                            Advance::Step => Shows::Step,
+                            Advance::Forward => Shows::Still,
+                        };
                         self.run.advance(advance, self.arrays.arena());
                         return Ok(Some(&self.arrays));
                     }

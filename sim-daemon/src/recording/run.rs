@@ -226,6 +226,11 @@ impl Run {
         self.inbox.op()
     }
 
+    /// Names of the arrays of the last command.
+    pub(super) fn names(&self) -> impl Iterator<Item = String> {
+        self.inbox.arrays().map(|row| row.name.clone())
+    }
+
     /// Goes on, and writes a frame.
     pub(super) fn advance(&mut self, advance: Advance, arena: &mut [u64]) {
         match advance {

@@ -4,7 +4,7 @@ use sim_physics::arrays::Field;
 
 use super::super::records::Record;
 use super::super::replay::{End, Gap, open};
-use super::super::{Playback, replay as run};
+use super::super::{Playback, Shows, replay as run};
 use super::{FRAMES, Recording, file, record, torques};
 use crate::cli::Replay;
 
@@ -115,4 +115,23 @@ fn a_playback_goes_on_behind_a_gap() {
         std::fs::remove_file(path).unwrap();
         assert_eq!((played, playback.end()), (frames, Some(end)));
     }
+}
+
+#[test]
+fn a_playback_with_starts_shows_the_states_that_no_command_made() {
+    let path = file("played-starts");
+    std::fs::write(&path, with_gap(3, 7, true).bytes().0).unwrap();
+    let played = Playback::open(&path, &[Field::JointQ], Some(1)).unwrap();
+    let mut playback = played.with_starts();
+    let mut shown = Vec::new();
+    while playback.advance().unwrap().is_some() {
+        shown.push(playback.shows());
+    }
+    std::fs::remove_file(path).unwrap();
+    let starts: Vec<usize> = (0..shown.len())
+        .filter(|&frame| shown[frame] == Shows::Start)
+        .collect();
+    // three frames come before the gap
+    assert_eq!(starts, [0, 4]);
+    assert_eq!(shown.len(), FRAMES - 4 + starts.len());
 }
