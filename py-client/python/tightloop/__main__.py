@@ -11,6 +11,7 @@ from pathlib import Path
 # Commands that are carried out here; all others are Rust's.
 _IN_PYTHON = {
     "demo": "tightloop.demo.command",
+    "export": "tightloop.datasets.command",
     "film": "tightloop.view.film_command",
     "view": "tightloop.view.command",
 }

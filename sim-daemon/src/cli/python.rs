@@ -19,6 +19,10 @@ pub(crate) enum Python {
     ///
     /// Example: tightloop film run.tlrec run.mp4 --worlds 16
     Film(Film),
+    /// Turn a recording into a dataset of episodes: HDF5, LeRobot, MCAP or Rerun.
+    ///
+    /// Example: tightloop export run.tlrec demos.hdf5 --to hdf5 --worlds 0-7
+    Export(Export),
     /// Tour the features: torques, targets, a grasp, many worlds, a trained policy.
     ///
     /// Example: tightloop demo --view
@@ -105,6 +109,48 @@ pub(crate) struct Film {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Export {
+    /// Recording, as `tightloop record` or `sim.record` writes it.
+    #[arg(value_name = "RECORDING")]
+    recording: PathBuf,
+
+    /// New file, or new folder of a LeRobot dataset.
+    out: PathBuf,
+
+    /// Format of the dataset.
+    #[arg(long, value_parser = ["hdf5", "lerobot", "mcap", "rerun"])]
+    to: String,
+
+    /// Fields of the observations, separated by commas.
+    #[arg(long, value_name = "NAMES", default_value = "joint_q,joint_qd")]
+    fields: String,
+
+    /// Commands that are the action, separated by commas; default: those that the recorded client sent first.
+    #[arg(long, value_name = "NAMES")]
+    action: Option<String>,
+
+    /// Joints or actuators whose commands are the action, as names or patterns such as arm/*, separated by commas.
+    #[arg(long, value_name = "NAMES")]
+    joints: Option<String>,
+
+    /// Worlds, such as 0-7,12; default: all.
+    #[arg(long)]
+    worlds: Option<String>,
+
+    /// Frames per second, of which the control rate is a multiple; default: the control rate.
+    #[arg(long)]
+    fps: Option<f64>,
+
+    /// Fewest steps of an episode; shorter ones are left out.
+    #[arg(long, value_name = "STEPS", default_value_t = 1)]
+    min_steps: usize,
+
+    /// What the robot does, in words, for LeRobot; default: the name of the recording.
+    #[arg(long, value_name = "TEXT")]
+    task: Option<String>,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Demo {
     /// Show this URDF, MJCF or scene file instead of the tour.
     file: Option<PathBuf>,
@@ -148,6 +194,7 @@ impl Python {
         let command = match self {
             Python::View(_) => "view",
             Python::Film(_) => "film",
+            Python::Export(_) => "export",
             Python::Demo(_) => "demo",
         };
         Err(DaemonError::NeedsPython { command })

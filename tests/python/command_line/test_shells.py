@@ -60,7 +60,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     assert done.returncode == 1 and str(tmp_path / "file") in done.stderr
 
 
-@pytest.mark.parametrize("command", ["view", "film", "demo"])
+@pytest.mark.parametrize("command", ["view", "film", "export", "demo"])
 def test_commands_of_python_have_the_flags_that_shells_complete(command):
     """``tightloop view --help`` is Python's, ``tightloop help view`` what completions and manual are made of."""
     flags = re.compile(r"^ +(?:-\w, )?(--[\w-]+)", re.MULTILINE)

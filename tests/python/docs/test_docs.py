@@ -82,6 +82,7 @@ def test_blocks_that_do_not_run_say_why():
         "needs an NVIDIA GPU": 1,
         "needs docker": 1,
         "needs jax": 3,
+        "needs lerobot": 1,
         "needs mjlab": 4,
         "needs mujoco": 1,
         "needs mujoco and onnxruntime": 1,

@@ -51,7 +51,7 @@ LAYERS = (
     ("tightloop.mujoco.batch",),
     # the names for users, `import tightloop as tl`
     ("tightloop",),
-    ("tightloop.view",),
+    ("tightloop.view", "tightloop.datasets"),
     ("tightloop.env",),
     ("tightloop.tasks", "tightloop.adapters"),
     ("tightloop.examples", "tightloop.mjlab"),
