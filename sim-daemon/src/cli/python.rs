@@ -129,7 +129,8 @@ pub(crate) struct Export {
     #[arg(long, value_name = "NAMES")]
     action: Option<String>,
 
-    /// Joints or actuators whose commands are the action, as names or patterns such as arm/*, separated by commas.
+    /// Joints or actuators whose commands are the action, as names or patterns such as arm/*, separated by commas;
+    /// default: all but the dofs of free bodies.
     #[arg(long, value_name = "NAMES")]
     joints: Option<String>,
 

@@ -63,6 +63,16 @@ def test_worlds_and_joints_are_chosen(run):
     assert [each.index for each in made] == [0, 1, 2, 3]
 
 
+def test_the_action_has_no_dofs_of_free_bodies_unless_they_are_named(arm, tmp_path):
+    arm.add_cube(pos=(3, 0, 1), name="cube")
+    path = tmp_path / "run.tlrec"
+    with tl.launch(arm, worlds=1) as sim, sim.record(path):
+        sim.step(joint_f=np.arange(8))
+    first, every = (next(iter(episodes(path, joints=joints))) for joints in (None, ["*"]))
+    np.testing.assert_array_equal(first.actions[0], every.actions[0][first.actions[0].astype(int)])
+    assert (first.actions.shape, every.actions.shape) == ((1, 2), (1, 8))
+
+
 @pytest.fixture
 def arm(tmp_path):
     urdf = tmp_path / "pendulum.urdf"
@@ -117,14 +127,23 @@ def test_a_restored_snapshot_begins_an_episode_where_time_jumps(arm, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("on_fault", "expected"), [("freeze", [(0, 2, True)]), ("reset", [(0, 2, True), (0, 2, False)])]
+    ("on_fault", "expected"), [("freeze", [(0, 2, True)]), ("reset", [(0, 2, True), (0, 1, False)])]
 )
 def test_a_faulted_world_ends_its_episode(arm, tmp_path, on_fault, expected):
+    # the run puts a world back and steps it in one frame, so that the state between is in none
     path = tmp_path / "run.tlrec"
     with tl.launch(arm, worlds=1, bounds={"joint_qd": 50.0}, on_fault=on_fault) as sim, sim.record(path):
         for force in (0, 0, 1e6, 0, 0):
             sim.step(joint_f=np.full(2, force))
     assert lengths(list(episodes(path))) == expected
+
+
+def test_a_world_that_faults_in_its_first_step_has_no_episode_from_there(arm, tmp_path):
+    path = tmp_path / "run.tlrec"
+    with tl.launch(arm, worlds=1, bounds={"joint_qd": 50.0}, on_fault="reset") as sim, sim.record(path):
+        for force in (1e6, 0, 0, 0):
+            sim.step(joint_f=np.full(2, force))
+    assert lengths(list(episodes(path))) == [(0, 2, False)]
 
 
 def test_a_recording_that_begins_in_the_middle_of_a_run_has_its_first_state(arm, tmp_path):

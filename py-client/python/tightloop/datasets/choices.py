@@ -35,6 +35,8 @@ _NAMES_OF_AXES = {
     "mocaps": "mocap_names",
     "equalities": "equality_names",
 }
+# How a free body's dofs end.
+_PARTS_OF_FREE = ("vx", "vy", "vz", "wx", "wy", "wz")
 # Rounding errors of a rate that is given in decimals.
 _RATE_SLACK = 1e-6
 
@@ -190,7 +192,7 @@ def _action_columns(
         there = columns[command]
         # of the components of a vector, such as mocap_pos
         parts = sizes[command] // max(len(there), 1)
-        chosen = [place for place, name in enumerate(there) if patterns is None or _matches(name, patterns)]
+        chosen = [place for place, name in enumerate(there) if _is_chosen(name, there, patterns)]
         places[command] = np.asarray([place * parts + part for place in chosen for part in range(parts)], np.intp)
         ending = "" if len(commands) == 1 else f".{command}"
         endings = [f"{ending}.{part}" for part in range(parts)] if parts > 1 else [ending]
@@ -206,6 +208,14 @@ def _action_columns(
             f"export: action is {', '.join(commands)}, which this scene has no columns of; name another"
         )
     return places, tuple(names)
+
+
+def _is_chosen(name: str, there: Sequence[str], patterns: Sequence[str] | None) -> bool:
+    if patterns is not None:
+        return _matches(name, patterns)
+    # no motor moves a free body
+    body, _, part = name.rpartition(".")
+    return part not in _PARTS_OF_FREE or f"{body}.vx" not in there
 
 
 def _matches(name: str, patterns: Sequence[str]) -> bool:

@@ -26,7 +26,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(
         prog="tightloop export",
-        description="Turn a recording into a dataset of episodes: HDF5 in robomimic's layout, LeRobot, MCAP or Rerun. "
+        description="Turn a recording into a dataset of episodes: HDF5 in robomimic's layout, LeRobot, MCAP or Rerun.\n"
         "Until it is complete it is NAME.part, which opens with all episodes so far. Stop with Ctrl-C.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
         type=_names,
         metavar="NAMES",
         help="joints or actuators whose commands are the action, as names or patterns such as arm/*, separated by "
-        "commas (default: all)",
+        "commas (default: all but the dofs of free bodies)",
     )
     made.add_argument("--worlds", type=_worlds, help="worlds, such as 0-7,12 (default: all)")
     made.add_argument(

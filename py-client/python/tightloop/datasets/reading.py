@@ -25,6 +25,8 @@ from tightloop.errors import ArgumentError
 Array = NDArray[Any]
 
 
+# Bits of `status` of a world that is frozen.
+_FAULTED = 1 | 8
 # Worlds whose arrays are gathered together: few, since images are large.
 _WORLDS_AT_ONCE = 32
 
@@ -104,8 +106,8 @@ def episodes(
         recording: Path of the recording.
         fields: Fields of the observations.
         action: Command or commands that are the action; those that the first step with commands sent if left out.
-        joints: Names or patterns, such as ``"arm/*"``, of the joints or actuators whose commands are the action; all if
-            left out.
+        joints: Names or patterns, such as ``"arm/*"``, of the joints or actuators whose commands are the action; all
+            but the dofs of free bodies if left out.
         worlds: How many worlds, the first ones; or a list of them; all if left out.
         fps: Frames per second, of which the control rate is a multiple. The first command of a frame is its action.
         min_steps: Fewest steps of an episode; shorter ones are left out.
@@ -185,17 +187,18 @@ class Reader:
             RecordingError: The file cannot be read further.
         """
         everywhere = np.full(len(self._worlds), True)
-        steps = np.zeros(0, np.uint64)
+        steps, faulted = np.zeros(0, np.uint64), ~everywhere
         while (arrays := self._playback.next()) is not None:
             shows = self._playback.shows
             frame = _Frame({name: array[self._worlds] for name, array in arrays.items()}, shows == "step", self.frames)
             before, steps = steps, frame.arrays["step"]
+            had_faulted, faulted = faulted, frame.arrays["status"] & _FAULTED != 0
             last = self._first + len(self._kept) - 1
             if shows == "start" or last < 0:
                 ended = begun = everywhere
             elif shows == "step":
-                # a world that the run put back to its start begins anew; one that is frozen ends
-                ended = steps != before + 1
+                # a frozen world ends; one that the run put back to its start begins anew, a step behind that
+                ended = (steps != before + 1) | had_faulted
                 begun = ended & ((steps != before) | (steps == 0))
             else:
                 ended = begun = steps != before
