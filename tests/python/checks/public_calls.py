@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from public_call import Call
-from public_env_calls import ENV_CALLS, ENV_LEFT, VIEW_CALLS, VIEW_LEFT
+from public_env_calls import DATASET_CALLS, DATASET_LEFT, ENV_CALLS, ENV_LEFT, VIEW_CALLS, VIEW_LEFT
 from wrong_values import BALL, COMMANDS, OF_MODELS, POSE, SHAPE, START, SURFACE
 
 import tightloop as tl
@@ -391,6 +391,6 @@ LEFT = {
     "Surface": "types of keyword arguments",
 }
 
-CALLS |= ENV_CALLS | VIEW_CALLS
+CALLS |= ENV_CALLS | VIEW_CALLS | DATASET_CALLS
 SETTERS["VectorEnv"] = (lambda world: world.envs, {"elapsed": "elapsed"})
-LEFT |= ENV_LEFT | VIEW_LEFT
+LEFT |= ENV_LEFT | VIEW_LEFT | DATASET_LEFT

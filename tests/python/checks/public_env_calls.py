@@ -1,10 +1,10 @@
-"""The public callables of environments and of the viewer, as `public_calls.py` lists those of simulations."""
+"""The public callables of environments, of the viewer and of datasets, as `public_calls.py` lists them."""
 
 from __future__ import annotations
 
 from public_call import Call
 
-from tightloop import env, view
+from tightloop import datasets, env, view
 
 STATES = "this task defines no states: tests/python/tasks/test_gymnasium_tasks.py has one that does"
 ENV_CALLS: dict[str, Call] = {
@@ -151,3 +151,27 @@ VIEW_CALLS: dict[str, Call] = {
     ),
 }
 VIEW_LEFT = {"Picture": "its parts are made by tightloop.view.parts"}
+
+EPISODES = {
+    "recording": "path",
+    "fields": "names",
+    "action": "names",
+    "joints": "names",
+    "worlds": "some worlds",
+    "fps": "positive",
+    "min_steps": "count",
+}
+DATASET_CALLS: dict[str, Call] = {
+    "episodes": Call(lambda _: datasets.episodes, EPISODES),
+    "export": Call(
+        lambda _: datasets.export,
+        EPISODES | {"out": "path", "to": "choice", "task": "text"},
+        {"to": "hdf5"},
+        {
+            "rewards": "test_export_command.py tries them",
+            "dones": "test_export_command.py tries them",
+            "progress": "a function of the caller's",
+        },
+    ),
+}
+DATASET_LEFT = {"Episode": "episodes() makes them", "Export": "export() makes it"}

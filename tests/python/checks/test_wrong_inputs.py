@@ -22,7 +22,7 @@ from wrong_values import KINDS
 
 import tightloop as tl
 from conftest import URDF
-from tightloop import env, view
+from tightloop import datasets, env, view
 
 # What a message says about the way out
 CURE = re.compile(
@@ -77,6 +77,9 @@ def world(tmp_path_factory) -> Iterator[Any]:
         contextlib.closing(env.Env("CartPoleBalance")) as single,
     ):
         sim.step()
+        folder = tmp_path_factory.mktemp("films")
+        with sim.record(folder / "run.tlrec"):
+            sim.step(joint_f=np.zeros(15))
         envs.reset(seed=1)
         single.reset(seed=1)
         info, snapshot, frame = sim.info, sim.snapshot(), sim.forward().copy()
@@ -107,7 +110,8 @@ def world(tmp_path_factory) -> Iterator[Any]:
             ik=tl.ik(scene(), tl.Reach("arm/fr3_hand")),
             picture=SimpleNamespace(render=render, anew=picture.anew),
             own={"Sim.send": sim.send, "Sim.restore": sim.restore, "Picture.render": picture.render},
-            folder=tmp_path_factory.mktemp("films"),
+            folder=folder,
+            recording=folder / "run.tlrec",
             mesh=sample_meshes.stl(tmp_path_factory.mktemp("meshes") / "box.stl"),
         )
 
@@ -123,6 +127,10 @@ def right(name: str, world: Any) -> dict[str, Any]:
         given["sim"] = world.sim
     if name == "Scene.add_mesh":
         given["path"] = world.mesh
+    if name in ("episodes", "export"):
+        given["recording"] = world.recording
+    if name == "export":
+        given["out"] = world.folder / "demos.hdf5"
     if name == "film":
         given |= {"out": world.folder / "film.png", "source": world.sim, "seconds": 0.01}
     return given
@@ -188,7 +196,7 @@ def test_there_are_a_thousand_cases():
 def test_every_public_callable_is_tried():
     """Every public name, every method with arguments, every argument and every property that can be set."""
     missing = []
-    for module in (tl, env, view):
+    for module in (tl, env, view, datasets):
         for name in module.__all__:
             thing = getattr(module, name)
             if name.startswith("_") or (isinstance(thing, type) and issubclass(thing, Exception)):
@@ -225,7 +233,7 @@ def untried(name: str, thing: Callable[..., Any]) -> list[str]:
     known = {
         *call.kinds,
         *call.left,
-        *right(name, SimpleNamespace(folder=Path(), sim=None, snapshot=None, mesh=Path())),
+        *right(name, SimpleNamespace(folder=Path(), sim=None, snapshot=None, mesh=Path(), recording=Path())),
     }
     taken = inspect.signature(thing).parameters.values()
     plain = [argument for argument in taken if argument.kind not in (argument.VAR_KEYWORD, argument.VAR_POSITIONAL)]

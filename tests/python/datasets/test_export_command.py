@@ -13,6 +13,7 @@ import recorded_run
 from recorded_run import LENGTHS, WORLDS, opened
 
 import tightloop as tl
+from tightloop import datasets
 from tightloop.datasets import episodes, export
 
 run = recorded_run.run
@@ -62,8 +63,8 @@ def test_wrong_usage_ends_with_2(run, tmp_path):
         ({"fields": ["rgb/wrist"]}, tl.UnknownField, r"no field `rgb/wrist`"),
         ({"fields": []}, tl.ArgumentError, r"fields is empty; give at least one name"),
         ({"fields": "joint_q"}, tl.ArgumentError, r"fields is 'joint_q'; give a list of names"),
-        ({"worlds": [1, 3]}, tl.ArgumentError, r"worlds has 3; the recording has 3 worlds, from 0 on"),
-        ({"worlds": 4}, tl.ArgumentError, r"worlds has 3; the recording has 3 worlds"),
+        ({"worlds": [1, 3]}, tl.ArgumentError, r"worlds has 3, and there are 3 in the recording, from 0 on"),
+        ({"worlds": 4}, tl.ArgumentError, r"worlds has 3, and there are 3"),
         ({"worlds": []}, tl.ArgumentError, r"worlds is empty"),
         ({"worlds": 1.5}, tl.ArgumentError, r"worlds is 1\.5; give how many, or a list of them"),
         ({"worlds": "ab"}, tl.ArgumentError, r"an entry of worlds is 'a'; give a whole number"),
@@ -96,7 +97,9 @@ def test_a_wrong_place_is_named_with_the_cure(run, tmp_path):
     there.mkdir()
     with pytest.raises(tl.ArgumentError, match=r"there, which is there already; remove it, or give another name"):
         export(run.path, there, to="lerobot")
-    with pytest.raises(tl.ArgumentError, match=r"out is 'a\.txt'; a file of format 'hdf5' ends in \.hdf5 or \.h5"):
+    with pytest.raises(
+        tl.ArgumentError, match=r"out is 'a\.txt'; give a file of format 'hdf5' a name in \.hdf5 or \.h5"
+    ):
         export(run.path, tmp_path / "a.txt", to="hdf5")
     with pytest.raises(tl.ArgumentError, match=r"there is no folder .*nowhere; make it first"):
         export(run.path, tmp_path / "nowhere/a.mcap", to="mcap")
@@ -130,3 +133,9 @@ def test_a_recording_without_commands_asks_for_the_action(run, tmp_path):
     with pytest.raises(tl.ArgumentError, match=r"no client sent a command .* name the action, one of joint_f"):
         export(path, tmp_path / "a.h5", to="hdf5")
     assert export(path, tmp_path / "a.h5", to="hdf5", action="joint_f").steps == 1
+
+
+def test_an_unknown_name_of_the_module_is_answered_with_the_nearest():
+    with pytest.raises(tl.UnknownAttribute, match=r"no attribute `exports`; did you mean .*export"):
+        _ = datasets.exports
+    assert dir(datasets) == ["Episode", "Export", "episodes", "export"]

@@ -24,7 +24,7 @@ from conftest import PENDULUM
 from tightloop.datasets import export
 
 EPISODES, STEPS, WORLDS = 60, 20, 2
-KILLS = 4
+KILLS = 3
 # Commits after each episode, and reports each that is committed.
 EXPORTER = """
 import sys

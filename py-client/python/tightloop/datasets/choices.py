@@ -234,7 +234,7 @@ def _worlds(there: int, given: int | Sequence[int] | None) -> tuple[int, ...]:
         raise ArgumentError("export: worlds is empty; give how many, or which ones")
     for world in chosen:
         if world >= there:
-            raise ArgumentError(f"export: worlds has {world}; the recording has {there} worlds, from 0 on")
+            raise ArgumentError(f"export: worlds has {world}, and there are {there} in the recording, from 0 on")
     return tuple(dict.fromkeys(chosen))
 
 

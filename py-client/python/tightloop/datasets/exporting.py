@@ -94,12 +94,14 @@ def export(
         RecordingError: The recording cannot be read.
         UnknownField: There is no such field.
     """
-    if to not in _WRITERS:
+    if not isinstance(to, str) or to not in _WRITERS:
         raise ArgumentError(f"export: to is {to!r:.80}; {suggestion(str(to), [*_WRITERS])}")
     module, name, endings = _WRITERS[to]
     path = checks.path("export: out", out, error=ArgumentError)
     if endings and path.suffix not in endings:
-        raise ArgumentError(f"export: out is {path.name!r}; a file of format {to!r} ends in {' or '.join(endings)}")
+        raise ArgumentError(
+            f"export: out is {path.name!r}; give a file of format {to!r} a name in {' or '.join(endings)}"
+        )
     check_place(path)
     least = checks.integer("export: min_steps", min_steps, least=1, error=ArgumentError)
     source = checks.path("export: recording", recording, error=ArgumentError)
