@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 import recorded_run
@@ -10,6 +11,7 @@ from recorded_run import LENGTHS, WORLDS
 import tightloop as tl
 from conftest import PENDULUM
 from tightloop.datasets import Episode, episodes
+from tightloop.datasets.choices import layout
 
 run = recorded_run.run
 
@@ -71,6 +73,31 @@ def test_the_action_has_no_dofs_of_free_bodies_unless_they_are_named(arm, tmp_pa
     first, every = (next(iter(episodes(path, joints=joints))) for joints in (None, ["*"]))
     np.testing.assert_array_equal(first.actions[0], every.actions[0][first.actions[0].astype(int)])
     assert (first.actions.shape, every.actions.shape) == ((1, 2), (1, 8))
+
+
+MUJOCO = """<mujoco model="m"><option timestep="0.005"/><worldbody>
+  <body name="hand" mocap="true"><geom size="0.1" contype="0" conaffinity="0"/></body>
+  <body name="ball" pos="1 0 1"><freejoint name="free"/><geom size="0.1"/></body>
+  <body name="cart"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+</worldbody><actuator><motor name="push" joint="slide"/></actuator></mujoco>"""
+
+
+def test_actions_of_mujoco_models_are_controls_and_columns_have_the_names_of_their_order(tmp_path):
+    scene = tl.Scene.from_mujoco(mujoco.MjModel.from_xml_string(MUJOCO))
+    path = tmp_path / "run.tlrec"
+    with tl.launch(scene, worlds=1) as sim, sim.record(path):
+        for control in range(3):
+            sim.step(ctrl=np.full((1, 1), control))
+    (made,) = episodes(path, fields=["qpos", "joint_q"])
+    np.testing.assert_array_equal(made.actions, [[0], [1], [2]])
+    chosen = layout(path, fields=["qpos"], action=["ctrl", "mocap_pos"], joints=None, worlds=None, fps=None)
+    assert chosen.fps == 200 and chosen.action_names[0] == "m/push.ctrl"
+    assert chosen.action_names[1:] == tuple(f"m/hand.mocap_pos.{part}" for part in range(3))
+    for field, quaternion in (("qpos", ("qw", "qx", "qy", "qz")), ("joint_q", ("qx", "qy", "qz", "qw"))):
+        names = [name.removeprefix("m/free.") for name in chosen.columns[field]]
+        assert tuple(names) == ("x", "y", "z", *quaternion, "m/slide")
+        # it is at rest, not turned
+        assert made.observations[field][0, names.index("qw")] == 1
 
 
 @pytest.fixture

@@ -145,7 +145,15 @@ def _names(what: str, given: str | Sequence[str]) -> tuple[str, ...]:
 def _columns(info: Mapping[str, Any], field: Mapping[str, Any]) -> tuple[str, ...]:
     axes = re.findall(r"\w+", field.get("axes", ""))
     key = _NAMES_OF_AXES.get(axes[1]) if len(axes) > 1 else None
-    return tuple(info[key]) if key else ()
+    names: list[str] = info[key] if key else []
+    if field.get("name") != "qpos":
+        return tuple(names)
+    turned = list(names)
+    for place, name in enumerate(names):
+        # MuJoCo's quaternions begin with w
+        if name.endswith(".qx"):
+            turned[place : place + 4] = [names[place + 3], *names[place : place + 3]]
+    return tuple(turned)
 
 
 def _sizes(info: Mapping[str, Any]) -> dict[str, int]:
