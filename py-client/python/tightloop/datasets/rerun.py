@@ -16,6 +16,7 @@ from tightloop.datasets.reading import Episode
 from tightloop.datasets.timed import observed
 from tightloop.datasets.twin_file import TwinFile
 from tightloop.datasets.writers import part_of, remove, writing
+from tightloop.errors import OutputError
 
 _COPIED_AT_ONCE = 1 << 24
 
@@ -58,7 +59,7 @@ class RerunWriter:
     def commit(self) -> None:
         """Let the unfinished file have all episodes so far."""
         with writing(self._out):
-            self._stream.flush()
+            self._flush()
             with self._growing.open("rb") as file:
                 file.seek(self._copied)
                 while data := file.read(_COPIED_AT_ONCE):
@@ -68,7 +69,7 @@ class RerunWriter:
     def close(self) -> None:
         """Finish the file, and give it its name."""
         with writing(self._out):
-            self._stream.flush()
+            self._flush()
             self._stream.disconnect()
             self._growing.rename(self._out)
             self._part.close()
@@ -80,6 +81,13 @@ class RerunWriter:
         self._part.close()
         remove(self._growing)
         remove(part_of(self._out))
+
+    def _flush(self) -> None:
+        try:
+            self._stream.flush()
+        except RuntimeError as problem:
+            # of a full disk; Rerun's log has the reason
+            raise OutputError(f"{self._out}: cannot be written: {problem}") from problem
 
     def _field(self, entity: str, field: str, values: NDArray[Any], seconds: NDArray[np.float64], episode: int) -> None:
         columns = self._layout.columns[field]
