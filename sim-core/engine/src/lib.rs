@@ -4,7 +4,7 @@
 //! kinematics and dynamics at states that a caller gives. The physics code is `sim_physics`, which the crates under `sim-core/stages`
 //! compile for each instruction set.
 //!
-//! Imports run one way: `random ← start ← backend ← auto ← snapshot ← options ← simulation ← checks ← params ← write ← command ←
+//! Imports run one way: `workers ← random ← start ← backend ← auto ← snapshot ← options ← simulation ← checks ← params ← write ← command ←
 //! dynamics`.
 
 mod auto;
@@ -18,4 +18,5 @@ pub mod random;
 pub mod simulation;
 pub mod snapshot;
 pub mod start;
+pub mod workers;
 mod write;

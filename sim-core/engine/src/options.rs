@@ -5,6 +5,7 @@ use crate::backend::{
     BackendError, Backends, Faults, Groups, Lanes, OutputsAt, Precision, available_memory, cpu, gpu,
 };
 use crate::random::{Draws, Numbering};
+use crate::workers::PARTS_PER_THREAD;
 use sim_model::Model;
 use sim_physics::arrays::{Field, Layout};
 use sim_physics::constants::options::Integrator;
@@ -300,7 +301,7 @@ pub(crate) fn memory_of(model: &Model, options: &Options) -> u64 {
     // scratch of each chunk, its matrices included, for every block that it keeps at hand; see backend/cpu/gathered.rs
     let m = model.constants();
     let matrices = 3 * m.pattern.len() + 2 * m.coupled.pattern.len();
-    let chunks = threads_of(options).saturating_mul(cpu::CHUNKS_PER_THREAD) as u64;
+    let chunks = threads_of(options).saturating_mul(PARTS_PER_THREAD) as u64;
     let spaces = match width {
         1 => 1,
         _ => cpu::spaces_max(m, (real * width) as usize) as u64,

@@ -11,6 +11,20 @@ use sim_physics::constants::params::Param;
 /// How many streams a task has, [`Stream::Task`].
 pub const TASK_STREAMS: u8 = 32;
 
+/// How many cameras have a stream of noise, [`Stream::DepthNoise`].
+pub const CAMERA_STREAMS: u8 = 100;
+
+/// What the draws of a world depend on, besides stream and step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Episode {
+    /// Its seed.
+    pub seed: u64,
+    /// Its number in draws.
+    pub world: u32,
+    /// Resets since it got its seed.
+    pub episode: u32,
+}
+
 /// Purpose of random numbers; different streams are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
@@ -18,6 +32,8 @@ pub enum Stream {
     StartPosition,
     /// Velocities after a reset; the index is a dof.
     StartVelocity,
+    /// Offsets of a camera after a reset; the index is eight times the camera's, and the part's.
+    Camera,
     /// A parameter after a reset; the index is a column of it.
     Param(Param),
     /// Draws of a task, such as goals. It has 32 streams, from 0, and defines the index.
@@ -44,6 +60,8 @@ pub enum Stream {
     AccelerometerNoise,
     /// Of `contact_sensor`; the index is the column.
     ContactSensorNoise,
+    /// Of the depths of a camera, by its number, below [`CAMERA_STREAMS`]; the index is a pixel.
+    DepthNoise(u8),
 }
 
 impl Stream {
@@ -52,6 +70,7 @@ impl Stream {
         match self {
             Stream::StartPosition => 0,
             Stream::StartVelocity => 1,
+            Stream::Camera => 2,
             Stream::Task(stream) => {
                 assert!(stream < TASK_STREAMS, "a task has {TASK_STREAMS} streams");
                 64 + u32::from(stream)
@@ -67,6 +86,10 @@ impl Stream {
             Stream::GyroNoise => 136,
             Stream::AccelerometerNoise => 137,
             Stream::ContactSensorNoise => 138,
+            Stream::DepthNoise(camera) => {
+                assert!(camera < CAMERA_STREAMS, "no stream of camera {camera}");
+                139 + u32::from(camera)
+            }
             // FNV-1a of its name, so that a row that joins the table moves no draw; the upper half is the parameters'
             Stream::Param(param) => {
                 let name = param.row().name.bytes();

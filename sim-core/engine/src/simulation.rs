@@ -10,6 +10,7 @@ pub use crate::random::Draws;
 use crate::backend::sharing::Sharing;
 use crate::backend::{Backend, BackendError, HostPages};
 use crate::options::{backends, check_memory, memory_of};
+use crate::random::Episode;
 use crate::snapshot::{self, Head, SnapshotError};
 use sim_model::Model;
 use sim_physics::arrays::{Dtype, Field, Layout};
@@ -194,6 +195,10 @@ impl Simulation {
     /// Threads that a step uses.
     pub fn threads(&self) -> usize {
         self.backend.threads()
+    }
+    /// What the draws of the first worlds depend on, as many as fit.
+    pub fn episodes(&self, to: &mut [Episode]) {
+        self.backend.episodes(to);
     }
     /// Arrays that `step` and `forward` write.
     pub fn layout(&self) -> &Layout {

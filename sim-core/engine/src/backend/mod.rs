@@ -19,7 +19,7 @@ pub use profile::{Histogram, LaneWork, Part, Profile, StageProfile};
 pub use sim_compile::{Line as CodeLine, Size as MachineCode};
 pub use sim_device::HostPages;
 
-use crate::random::Numbering;
+use crate::random::{Episode, Numbering};
 use sharing::Sharing;
 use std::ops::Range;
 use std::sync::Arc;
@@ -197,6 +197,8 @@ pub trait Backend: Send {
     /// Resets the worlds of the mask (none = all): to the start of their next episode, or of the first episode of new seeds (one for
     /// all worlds, or one per world). [`crate::start::StartDraw`] draws the start.
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>);
+    /// The episodes of the first worlds, as many as fit.
+    fn episodes(&self, to: &mut [Episode]);
     /// Begins the run again, as if no frame had been made and nothing written; false on the CPU, where new worlds are as fast.
     fn restart(&mut self) -> bool {
         false

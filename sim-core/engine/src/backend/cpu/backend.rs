@@ -2,12 +2,12 @@
 
 use super::chunk::{Chunk, Job};
 use super::transfer;
-use crate::backend::{Backend, BackendError, Faults, Frozen, Input, MachineCode, Profile, Values};
-use rayon::prelude::*;
+use crate::backend::{Backend, Faults, Frozen, Input, MachineCode, Profile, Values};
+use crate::random::Episode;
+use crate::workers::{PARTS_PER_THREAD, Workers};
 use sim_physics::compiled::Stages;
 use sim_physics::lane::Lane;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// [`Chunk::run`], compiled for an instruction set.
 ///
@@ -24,9 +24,6 @@ pub(super) struct CompiledStages<F: Lane> {
     pub chunk: RunChunk<F>,
 }
 
-/// Chunks per thread: enough that one slow block does not leave the other threads idle.
-pub(crate) const CHUNKS_PER_THREAD: usize = 4;
-
 /// The backend of one group of worlds.
 pub(super) struct Cpu<F: Lane> {
     chunks: Vec<Chunk<F>>,
@@ -36,37 +33,6 @@ pub(super) struct Cpu<F: Lane> {
     device: String,
     arena_words: usize,
     run: RunChunk<F>,
-}
-
-/// The threads that step the chunks.
-#[derive(Clone)]
-pub(super) enum Workers {
-    /// The caller's thread.
-    Caller,
-    /// A pool for one group.
-    Own(Arc<rayon::ThreadPool>),
-    /// A pool for all groups: threads that one leaves idle work for another.
-    Shared(Arc<rayon::ThreadPool>),
-}
-
-impl Workers {
-    pub fn new(threads: usize, groups: usize) -> Result<Workers, BackendError> {
-        if threads == 1 && groups == 1 {
-            return Ok(Workers::Caller);
-        }
-        let builder = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("step-{i}"));
-        let failed = |e: rayon::ThreadPoolBuildError| BackendError::Threads {
-            threads,
-            reason: e.to_string(),
-        };
-        let pool = Arc::new(builder.build().map_err(failed)?);
-        Ok(match groups {
-            1 => Workers::Own(pool),
-            _ => Workers::Shared(pool),
-        })
-    }
 }
 
 impl<F: Lane> Cpu<F> {
@@ -81,7 +47,7 @@ impl<F: Lane> Cpu<F> {
         let parts = if threads == 1 {
             1
         } else {
-            (threads * CHUNKS_PER_THREAD).min(blocks)
+            (threads * PARTS_PER_THREAD).min(blocks)
         };
         let chunks = (0..parts)
             .map(|part| {
@@ -113,18 +79,7 @@ impl<F: Lane> Cpu<F> {
     fn for_each(&mut self, work: impl Fn(&mut Chunk<F>, &Job<F>) + Send + Sync) {
         let job = &self.job;
         let work = |chunk: &mut Chunk<F>| work(chunk, job);
-        match &self.workers {
-            Workers::Caller => self.chunks.iter_mut().for_each(work),
-            Workers::Own(pool) => pool.install(|| self.chunks.par_iter_mut().for_each(work)),
-            // one job per chunk, in order of arrival: a thread that waits inside a job, as those of an iterator do, would start
-            // another group's job and delay its own
-            Workers::Shared(pool) => pool.in_place_scope(|scope| {
-                let work = &work;
-                for chunk in &mut self.chunks {
-                    scope.spawn(move |_| work(chunk));
-                }
-            }),
-        }
+        self.workers.for_each(&mut self.chunks, work);
     }
 }
 
@@ -177,6 +132,12 @@ impl<F: Lane> Backend for Cpu<F> {
 
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
         self.for_each(|chunk, job| chunk.reset(job, mask, seeds));
+    }
+
+    fn episodes(&self, to: &mut [Episode]) {
+        for chunk in &self.chunks {
+            chunk.episodes(&self.job, to);
+        }
     }
 
     fn take_frozen(&mut self) -> Frozen {

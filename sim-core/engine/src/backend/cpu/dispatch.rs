@@ -1,12 +1,13 @@
 //! Chooses the instruction set once, at start: one compiled version of the physics code for each.
 
-use super::backend::{CompiledStages, Cpu, Workers};
+use super::backend::{CompiledStages, Cpu};
 use super::chunk::{Chunk, Job};
 use super::compiled::{CompiledStep, StagesOfModel};
 use super::transfer::Arena;
 use crate::backend::{
     Backend, BackendError, Backends, Groups, Lanes, OutputsAt, Precision, Profile,
 };
+use crate::workers::Workers;
 use sim_model::Model;
 use sim_physics::arrays::Layout;
 use sim_physics::compiled::Stages;
@@ -166,7 +167,8 @@ fn boxed<F: Lane>(
     let compiled = compiled.ok().flatten().map(Arc::new);
     // one thread per block is enough
     let threads = (options.threads).min(groups.count * groups.worlds.div_ceil(F::WIDTH));
-    let workers = Workers::new(threads, groups.count)?;
+    let failed = |reason| BackendError::Threads { threads, reason };
+    let workers = Workers::new(threads, groups.count).map_err(failed)?;
     let made = groups.numberings().map(|numbering| {
         let cpu = Cpu::new(
             job(model, compiled.clone(), numbering),

@@ -1,4 +1,4 @@
-//! The CPU backend: blocks of worlds, one world per SIMD lane, spread over threads. Sole user of rayon.
+//! The CPU backend: blocks of worlds, one world per SIMD lane, spread over threads.
 //!
 //! A control frame is one pass per block: all substeps run while the block's state is in cache. Where blocks gather, it is one pass
 //! per cluster of blocks, whose slowest worlds share further blocks (`gathering`). A frame allocates nothing, except for a
@@ -34,7 +34,6 @@ mod run;
 mod space;
 mod transfer;
 
-pub(crate) use backend::CHUNKS_PER_THREAD;
 pub use compiled::{ProgramListing, SectionListing, listing};
 pub use dispatch::available;
 pub(crate) use dispatch::{CpuOptions, create};

@@ -1,6 +1,7 @@
 //! Resets of worlds.
 
 use super::chunk::{Chunk, Job};
+use crate::random::Episode;
 use sim_physics::arrays::Array;
 use sim_physics::lane::{Lane, Real};
 
@@ -35,6 +36,20 @@ impl<F: Lane> Chunk<F> {
                 }
                 None => self.begin_next(job, world),
             }
+        }
+    }
+
+    /// Tells the episodes of its worlds, as far as there is room.
+    pub(super) fn episodes(&self, job: &Job<F>, to: &mut [Episode]) {
+        for (world, outside) in self.worlds.clone().enumerate() {
+            let Some(to) = to.get_mut(outside) else {
+                return;
+            };
+            *to = Episode {
+                seed: self.seeds[world],
+                world: job.numbering.number(outside),
+                episode: self.episodes[world],
+            };
         }
     }
 

@@ -12,7 +12,7 @@ use crate::backend::sharing::Sharing;
 use crate::backend::{
     Backend, BackendError, Faults, FirstFrozen, Frozen, Input, ProgramInfo, Values,
 };
-use crate::random::Numbering;
+use crate::random::{Episode, Numbering};
 use crate::start::StartDraw;
 use sim_device::{Buffer, Device, HostPages, Staging};
 use sim_physics::arrays::Array;
@@ -172,6 +172,18 @@ impl Backend for Gpu {
     fn restore(&mut self, records: &[u8], mask: Option<&[bool]>, from_world: Option<usize>) {
         let restored = self.restore_records(records, mask, from_world);
         self.check(restored);
+    }
+
+    fn episodes(&self, to: &mut [Episode]) {
+        let counted = self.mirror.seeds.iter().zip(&self.mirror.episodes);
+        for (world, (to, (&seed, &episode))) in to.iter_mut().zip(counted).enumerate() {
+            let world = self.numbering.number(world);
+            *to = Episode {
+                seed,
+                world,
+                episode,
+            };
+        }
     }
 
     fn reset(&mut self, mask: Option<&[bool]>, seeds: Option<&[u64]>) {
