@@ -47,8 +47,9 @@ mod value_checks;
 mod visual;
 
 pub use description::{
-    Actuator, Collision, ContactSensor, Description, HeightScan, Joint, JointDof, JointExtras,
-    Link, Mimic, ParamDraw, Precompiled, Robot, Site, Solver, StaticShape, TargetMode,
+    Actuator, Camera, CameraPart, Collision, ContactSensor, Description, HeightScan, Joint,
+    JointDof, JointExtras, Lens, Link, Mimic, ParamDraw, Precompiled, Robot, Sees, Site, Solver,
+    StaticShape, TargetMode,
 };
 pub use distribution::{Distribution, ParamRanges};
 pub use error::ModelError;
@@ -57,7 +58,7 @@ pub use geometry::Shape;
 pub use inertia::{Inertial, principal_moments};
 pub use joint_kind::JointKind;
 pub use model::{KeyState, Model, RobotRange, SensedShapes, Start};
-pub use mujoco::{MujocoContents, MujocoElement, MujocoOptions};
+pub use mujoco::{MujocoCamera, MujocoContents, MujocoElement, MujocoOptions};
 pub use pose::Pose;
 pub use rigid_body::Body;
 pub use sim_physics::constants::contact::{Cone, FrictionCombine};

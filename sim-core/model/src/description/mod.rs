@@ -1,6 +1,7 @@
 //! What users name and edit: a scene, its robots, their joints, and what is named in them.
 
 mod balance;
+mod camera;
 mod constraints;
 mod dofs;
 mod followers;
@@ -18,6 +19,7 @@ mod tendons;
 pub(crate) use crate::geometry::Shape;
 pub(crate) use crate::inertia::Inertial;
 pub(crate) use crate::joint_kind::JointKind;
+pub use camera::{Camera, CameraPart, Lens, Sees};
 pub use constraints::{Constraint, ConstraintLaw, Measure, Tendon};
 pub(crate) use followers::start_followers;
 pub(crate) use frames::Bearer;

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeSet;
 
+use super::camera::Camera;
 use super::robot::Robot;
 use crate::distribution::ParamRanges;
 use crate::error::ModelError;
@@ -51,6 +52,8 @@ pub struct Description {
     pub contact_sensors: Vec<ContactSensor>,
     /// Grids of vertical rays.
     pub height_scans: Vec<HeightScan>,
+    /// Cameras, for those who draw.
+    pub cameras: Vec<Camera>,
 }
 
 /// A frame of interest: in the world, or on a link.
@@ -174,6 +177,7 @@ impl Description {
             sites: Vec::new(),
             contact_sensors: Vec::new(),
             height_scans: Vec::new(),
+            cameras: Vec::new(),
         }
     }
 

@@ -33,6 +33,7 @@ use crate::error::ModelError;
 use crate::pose::Pose;
 pub use contents::{MujocoContents, MujocoElement};
 use format::ModelFile;
+pub use looks::MujocoCamera;
 pub use options::MujocoOptions;
 use sim_physics::constants::options::Integrator;
 

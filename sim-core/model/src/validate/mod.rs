@@ -1,5 +1,6 @@
 //! Checks of a description: everything a model relies on, refused by name.
 
+mod cameras;
 mod fault;
 mod joint;
 mod robot;

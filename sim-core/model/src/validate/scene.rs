@@ -99,6 +99,7 @@ impl Description {
         self.robots.iter().try_for_each(Robot::validate)?;
         self.validate_shape_names()?;
         self.validate_sensors()?;
+        self.validate_cameras()?;
         self.param_draws().map(drop)
     }
 }

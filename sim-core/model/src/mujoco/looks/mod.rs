@@ -1,20 +1,24 @@
 //! What a model looks like: the geoms and sites that MuJoCo's viewer shows, whole meshes, in the
 //! colours of their materials.
 
+mod cameras;
+
+pub use cameras::MujocoCamera;
+
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::fields::height_field;
-use super::format::ModelFile;
-use super::frame;
-use super::frames::on_links;
-use super::geoms::primitive;
-use super::meshes::Meshes;
-use super::names::names;
 use crate::description::{OnLink, Robot};
 use crate::error::ModelError;
 use crate::geometry::{Shape, TriMesh};
+use crate::mujoco::fields::height_field;
+use crate::mujoco::format::ModelFile;
+use crate::mujoco::frame;
+use crate::mujoco::frames::on_links;
+use crate::mujoco::geoms::primitive;
+use crate::mujoco::meshes::Meshes;
+use crate::mujoco::names::names;
 use crate::visual::{Look, Visual, Visuals};
 
 /// Groups of geoms and of sites that MuJoCo's viewer shows at first: those below.
