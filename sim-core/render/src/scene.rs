@@ -103,7 +103,7 @@ impl Scene {
             match seen(part) {
                 Seen::Solid(solid, coat) => things.push(Thing {
                     body: part.body,
-                    frame: frame(&part.pose),
+                    frame: Frame::from(&part.pose),
                     surface: Surface::Solid {
                         solid,
                         label: part.label,
@@ -118,7 +118,7 @@ impl Scene {
                     };
                     things.push(Thing {
                         body: part.body,
-                        frame: frame(&part.pose).then(&center),
+                        frame: Frame::from(&part.pose).then(&center),
                         surface: Surface::Field {
                             field,
                             label: part.label,
@@ -298,6 +298,8 @@ fn seen(part: &Part) -> Seen<'_> {
     Seen::Solid(solid, part.paint.on_solid())
 }
 
-fn frame(pose: &Pose) -> Frame {
-    Frame::new(pose.pos.map(|x| x as f32), pose.quat.map(|x| x as f32))
+impl From<&Pose> for Frame {
+    fn from(pose: &Pose) -> Frame {
+        Frame::new(pose.pos.map(|x| x as f32), pose.quat.map(|x| x as f32))
+    }
 }

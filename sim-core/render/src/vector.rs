@@ -104,7 +104,7 @@ impl Frame {
 
     /// A child of this frame, in its parent's.
     #[inline(always)]
-    pub(crate) fn then(&self, child: &Frame) -> Frame {
+    pub fn then(&self, child: &Frame) -> Frame {
         let columns = three!(k => self.turn(column(&child.rot, k)));
         Frame {
             pos: add(self.pos, self.turn(child.pos)),
