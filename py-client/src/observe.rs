@@ -7,7 +7,7 @@ use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, Field, Precision, Shows};
+use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, FrameFields, Precision, Shows};
 
 use crate::errors::raise;
 
@@ -27,7 +27,7 @@ impl Evaluation {
         precision: &str,
         fields: Vec<String>,
     ) -> PyResult<Evaluation> {
-        let fields = named(py, &fields)?;
+        let fields = named(py, &fields, None)?;
         let precision = match precision {
             "f64" => Precision::F64,
             _ => Precision::F32,
@@ -71,7 +71,7 @@ pub(crate) struct Playback {
 impl Playback {
     /// Frames of the first ``worlds`` of a recording, with those of its starts if ``starts``.
     #[new]
-    #[pyo3(signature = (path, worlds, fields, *, starts = false, threads = None))]
+    #[pyo3(signature = (path, worlds, fields, *, starts = false, threads = None, cameras = None))]
     fn new(
         py: Python<'_>,
         path: PathBuf,
@@ -79,8 +79,9 @@ impl Playback {
         fields: Vec<String>,
         starts: bool,
         threads: Option<usize>,
+        cameras: Option<&str>,
     ) -> PyResult<Playback> {
-        let fields = named(py, &fields)?;
+        let fields = named(py, &fields, cameras)?;
         let opened = py.detach(|| observe::Playback::open(&path, &fields, threads));
         let opened = opened.map_err(|error| raised(py, &error))?;
         Ok(Playback {
@@ -147,12 +148,14 @@ fn raised(py: Python<'_>, error: &DaemonError) -> PyErr {
     raise(py, error.kind(), error.to_string())
 }
 
-fn named(py: Python<'_>, names: &[String]) -> PyResult<Vec<Field>> {
-    let field = |name: &String| {
-        let unknown = || raise(py, "UnknownField", format!("there is no field `{name}`"));
-        Field::named(name).ok_or_else(unknown)
-    };
-    names.iter().map(field).collect()
+/// The fields of these names, and cameras as JSON besides those of the scene.
+fn named(py: Python<'_>, names: &[String], cameras: Option<&str>) -> PyResult<FrameFields> {
+    let asked = FrameFields::named(names.iter().map(String::as_str));
+    let asked =
+        asked.map_err(|name| raise(py, "UnknownField", format!("there is no field `{name}`")))?;
+    let cameras = serde_json::from_str(cameras.unwrap_or("[]"));
+    let cameras = cameras.map_err(|error| raise(py, "SceneError", format!("cameras: {error}")))?;
+    Ok(FrameFields { cameras, ..asked })
 }
 
 /// Copies of the first worlds of arrays, by name.

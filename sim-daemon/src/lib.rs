@@ -13,6 +13,7 @@ mod devices;
 pub mod environment;
 mod error;
 mod export;
+mod eyes;
 mod inspect;
 mod list;
 pub mod observe;

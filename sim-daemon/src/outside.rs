@@ -12,12 +12,14 @@ use sim_protocol::{Command, CommandHeader, Description, Op};
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, Advance, RunInfo, snapshot};
+use crate::eyes::{Eyes, FrameFields};
 use crate::recording;
 use crate::serve::{Exchange, Ik, Rollouts, Steps};
 
 /// Worlds of a scene, on which commands and files act. Whatever acts finds them in the same state.
 pub struct Worlds {
     simulation: Simulation,
+    eyes: Eyes,
     description: Description,
     inbox: Inbox,
     mask: Vec<bool>,
@@ -41,6 +43,7 @@ impl Worlds {
         };
         let model = described.compile().expect("the scene is right");
         let simulation = Simulation::new(model, &options).expect("the scene runs");
+        let eyes = Eyes::none(&simulation);
         let info = RunInfo {
             scene: &described,
             scene_text: text.to_owned(),
@@ -49,6 +52,7 @@ impl Worlds {
             threads: 1,
             frames_held: 1,
             watch_worlds: 1,
+            images: eyes.images(),
         };
         let description =
             export::description(simulation.model(), &options, simulation.layout(), info);
@@ -59,6 +63,7 @@ impl Worlds {
             state: simulation.snapshot(),
             description,
             simulation,
+            eyes,
         }
     }
 
@@ -137,8 +142,8 @@ impl Worlds {
             inbox: &mut self.inbox,
             frames: 0,
         };
-        let (simulation, mut rollouts) = (&mut self.simulation, Rollouts::default());
-        let answer = rollouts.carry_out(&question, false, simulation, &mut steps, 0);
+        let worlds = (&mut self.simulation, &mut self.eyes);
+        let answer = Rollouts::default().carry_out(&question, false, worlds, &mut steps, 0);
         match answer {
             Ok(answer) => Ok(answer.len()),
             Err(refusal) => Err(refusal.reason),
@@ -215,7 +220,7 @@ pub fn replay(file: &Path) -> Result<u64, String> {
 /// # Errors
 /// What an observer reports.
 pub fn playback(file: &Path) -> Result<usize, String> {
-    let fields = [Field::JointQ, Field::BodyQ];
+    let fields = FrameFields::from(&[Field::JointQ, Field::BodyQ][..]);
     let said = |error: DaemonError| error.to_string();
     let mut played = recording::Playback::open(file, &fields, Some(1)).map_err(said)?;
     let mut frames = 0;

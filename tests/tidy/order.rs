@@ -121,6 +121,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src",
         &[
+            "workers",
             "random",
             "start",
             "backend",
@@ -309,6 +310,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "list",
             "top",
             "inspect",
+            "eyes",
             "export",
             "advice",
             "recording",
@@ -351,6 +353,12 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/render/src/tree",
         &["build", "cast", "fill", "shade", "parts"],
+    ),
+    (
+        "sim-daemon/src/eyes",
+        &[
+            "fields", "chance", "memory", "paint", "parts", "sight", "images", "part", "drawing",
+        ],
     ),
     ("sim-daemon/src/export", &["refusal", "snapshot", "arrays"]),
     (

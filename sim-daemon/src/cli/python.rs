@@ -146,6 +146,10 @@ pub(crate) struct Export {
     #[arg(long, value_name = "STEPS", default_value_t = 1)]
     min_steps: usize,
 
+    /// Scene file whose cameras see the replay, besides those of the recorded scene.
+    #[arg(long, value_name = "FILE")]
+    cameras: Option<PathBuf>,
+
     /// What the robot does, in words, for LeRobot; default: the name of the recording.
     #[arg(long, value_name = "TEXT")]
     task: Option<String>,

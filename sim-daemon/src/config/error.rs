@@ -40,6 +40,14 @@ pub enum ConfigError {
         /// What is wrong, and the cure.
         reason: String,
     },
+    /// A camera whose entries do not fit each other.
+    #[error("camera `{camera}`: {reason}")]
+    Camera {
+        /// Its name.
+        camera: String,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
     /// A distribution of the start state that nothing can have.
     #[error("{culprit}: {problem}")]
     Randomize {

@@ -3,12 +3,13 @@
 //! Paths in a file are relative to it; relative paths in a text are relative to the folder given with it.
 
 mod bodies;
+mod cameras;
 mod compiled;
 mod error;
 mod ik;
+mod looks;
 mod mujoco;
 mod number;
-mod parts;
 pub(crate) mod paths;
 mod pose;
 mod randomize;
@@ -17,17 +18,17 @@ mod robots;
 mod scene;
 mod sensors;
 mod shapes;
-mod skeleton;
 mod summary;
 mod surface;
 
 pub use bodies::BodyTable;
+pub use cameras::CameraTable;
 pub use error::ConfigError;
 pub use ik::{IkReach, IkTask};
+pub use looks::Parts;
+pub(crate) use looks::{Looks, PartKind, SeenPart, hull_sides};
 pub use mujoco::{MujocoTable, mujoco_summary};
 pub use number::{Number, PerDof};
-pub use parts::Parts;
-pub(crate) use parts::hull_sides;
 pub use randomize::{DistributionTable, ParamTable, RandomizeTable};
 pub use robots::{ModeName, RobotTable};
 pub(crate) use scene::SCENE_MAX;

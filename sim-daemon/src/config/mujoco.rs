@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use sim_model::{Cone, Description, MujocoOptions, Robot};
+use sim_model::{Cone, Description, Lens, MujocoCamera, MujocoOptions, Robot};
 
 use super::error::ConfigError;
 use super::number::Number;
@@ -47,7 +47,7 @@ impl MujocoTable {
 }
 
 /// What a client wants to know of an exported model: the keys of [`robot_summary`], names of actuators, sites, geoms, tendons and
-/// sensors, and `options` with the keys of a scene.
+/// sensors, `cameras`, and `options` with the keys of a scene.
 ///
 /// # Errors
 /// What is wrong with the file, or not supported, by name.
@@ -98,6 +98,8 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
         };
         format!("{kind:?}{implicit}{safe}{islands}{warm}, ls_tolerance {ls_tolerance}{noslip}")
     });
+    let cameras = Robot::mujoco_cameras(path)?;
+    summary["cameras"] = cameras.iter().map(camera_summary).collect();
     summary["options"] = json!({
         "integrator": integrator,
         "dt": scene.dt,
@@ -114,4 +116,23 @@ pub fn mujoco_summary(path: &Path, max_hull_vertices: usize) -> Result<Value, Co
         },
     });
     Ok(summary)
+}
+
+/// A camera: its link, its frame there, `resolution` [pixels], and `fov` [rad], or `focal` and `center` [pixels].
+fn camera_summary(camera: &MujocoCamera) -> Value {
+    let (fov, focal, center) = match camera.lens {
+        Lens::Fov(fov) => (Some(fov), None, None),
+        Lens::Intrinsics { focal, center } => (None, Some(focal), Some(center)),
+    };
+    json!({
+        "name": camera.name,
+        "link": camera.link,
+        "pos": camera.pose.pos,
+        "quat": camera.pose.quat,
+        "resolution": camera.resolution,
+        "fov": fov,
+        "focal": focal,
+        "center": center,
+        "is_fixed": camera.is_fixed,
+    })
 }

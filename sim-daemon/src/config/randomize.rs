@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sim_model::{Description, Distribution, Joint, JointDof, JointKind, ModelError, Robot};
+use sim_model::{
+    CameraPart, Description, Distribution, Joint, JointDof, JointKind, ModelError, Robot,
+};
 use sim_physics::constants::params::Param;
 
 use super::error::ConfigError;
@@ -29,6 +31,10 @@ pub struct RandomizeTable {
     /// Of their velocities: `vx`, `vy`, `vz` [m/s], `wx`, `wy`, `wz` [rad/s], in the world's axes.
     #[serde(skip_serializing_if = "Named::is_empty")]
     pub body_qd: Named<Named<DistributionTable>>,
+    /// Of cameras, along and about their own axes: `x`, `y`, `z` [m], `roll`, `pitch`, `yaw` [rad], and `focal`, a part of the
+    /// focal lengths [–].
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    pub cameras: Named<Named<DistributionTable>>,
     /// Of parameters, which are replaced, not offset.
     #[serde(skip_serializing_if = "Named::is_empty")]
     pub params: Named<ParamTable>,
@@ -123,6 +129,24 @@ impl RandomizeTable {
                     let distribution = table.checked(&format!("{culprit}, {part}"))?;
                     set(&mut joint.dofs[dof], distribution);
                 }
+            }
+        }
+        for (name, tables) in &self.cameras {
+            let field = "cameras";
+            let culprit = Culprit { field, name };
+            let Some(place) = scene.cameras.iter().position(|camera| camera.name == *name) else {
+                let known = some(scene.cameras.iter().map(|camera| &camera.name));
+                let problem = format!("there is no such camera; there are: {known}");
+                return Err(culprit.error(problem));
+            };
+            for (part, table) in tables {
+                let names = CameraPart::ALL.map(CameraPart::name);
+                let Some(index) = names.iter().position(|known| known == part) else {
+                    let problem = format!("has no part `{part}`; use {}", names.join(", "));
+                    return Err(culprit.error(problem));
+                };
+                let distribution = table.checked(&format!("{culprit}, {part}"))?;
+                scene.cameras[place].draws[index] = Some(distribution);
             }
         }
         for (name, table) in &self.params {

@@ -9,6 +9,7 @@ use sim_model::files;
 use sim_model::{Cone, Description, FrictionCombine, Solver, check_counts};
 
 use super::bodies::BodyTable;
+use super::cameras::CameraTable;
 use super::error::ConfigError;
 use super::mujoco::MujocoTable;
 use super::number::Number;
@@ -93,6 +94,9 @@ pub struct SceneFile {
     /// Grids of vertical rays under frames.
     #[serde(default, rename = "height_scan", skip_serializing_if = "Vec::is_empty")]
     pub height_scans: Vec<HeightScanTable>,
+    /// Cameras, whose images are fields of frames.
+    #[serde(default, rename = "camera", skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<CameraTable>,
 }
 
 fn gravity() -> [Number; 3] {
@@ -357,6 +361,8 @@ impl SceneFile {
             .iter()
             .map(HeightScanTable::scan)
             .collect();
+        let cameras = self.cameras.iter().map(CameraTable::camera);
+        description.cameras = cameras.collect::<Result<_, _>>()?;
         self.randomize.write(&mut description)?;
         description.validate()?;
         Ok(description)

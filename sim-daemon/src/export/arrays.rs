@@ -4,6 +4,7 @@ use sim_engine::simulation::Simulation;
 use sim_protocol::{Dtype, Table};
 
 use crate::export;
+use crate::eyes::Images;
 
 /// The arrays of a frame.
 pub struct Arrays {
@@ -25,12 +26,11 @@ pub struct Array<'a> {
 }
 
 impl Arrays {
-    /// As a simulation's frames are laid out; all zero.
-    pub(crate) fn new(simulation: &Simulation) -> Arrays {
-        let layout = simulation.layout();
+    /// As frames of a simulation and of its cameras are laid out; all zero.
+    pub(crate) fn new(simulation: &Simulation, images: &Images) -> Arrays {
         Arrays {
-            table: export::frame_table(layout),
-            arena: vec![0; layout.bytes.div_ceil(8)],
+            table: export::frame_table(simulation.layout(), images),
+            arena: vec![0; images.arena_bytes().div_ceil(8)],
         }
     }
 

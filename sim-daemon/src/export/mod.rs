@@ -17,6 +17,7 @@ use sim_protocol::{
 };
 
 use crate::export::refusal::{Refusal, refusal};
+use crate::eyes::{self, Images};
 
 // a frame can carry all fields, and an observer's the state besides
 const _: () = assert!(Field::ALL.len() < protocol::ROWS_MAX);
@@ -37,16 +38,22 @@ pub(crate) struct RunInfo<'a> {
     pub(crate) threads: usize,
     pub(crate) frames_held: usize,
     pub(crate) watch_worlds: usize,
+    /// Images of cameras in the frames.
+    pub(crate) images: &'a Images,
 }
 
-/// The table of a frame: the layout's arena behind the field table.
-pub(crate) fn frame_table(layout: &Layout) -> Table {
+/// The table of a frame: the arena of the layout and the images behind the field table.
+pub(crate) fn frame_table(layout: &Layout, images: &Images) -> Table {
     let slots = layout.slots.iter();
     let slots = slots.map(|slot| {
         let name = slot.field.row().name.to_owned();
         (name, dtype(slot.dtype), slot.shape.clone(), slot.offset)
     });
-    Table::over_arena(slots, layout.bytes)
+    let rows = images.fields().iter().map(|image| {
+        let name = image.name.clone();
+        (name, image.dtype, image.shape.clone(), image.offset)
+    });
+    Table::over_arena(slots.chain(rows), images.arena_bytes())
 }
 
 /// Names of the commands that are 0 in worlds that stop because no command comes.
@@ -182,6 +189,7 @@ pub(crate) fn description(
             .slots
             .iter()
             .map(|slot| field_info(slot.field.row(), dtype(slot.dtype), slot.shape.clone()))
+            .chain(info.images.fields().iter().map(|image| image.info()))
             .collect(),
         known_fields: Field::ALL
             .iter()
@@ -193,7 +201,9 @@ pub(crate) fn description(
                 };
                 field_info(row, dtype, Vec::new())
             })
+            .chain(eyes::known(info.scene).map(|image| image.known()))
             .collect(),
+        segment_names: info.images.segments().to_vec(),
         commands: {
             let mut commands: Vec<InputInfo> = input(|field| field.row().command.is_some());
             let loads = model.constants().varying.params();

@@ -3,20 +3,21 @@
 use std::path::Path;
 
 use sim_engine::simulation::{Options, Precision, Simulation};
-use sim_physics::arrays::Field;
 
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::arrays::Arrays;
+use crate::eyes::{Eyes, FrameFields, Images, Sight};
 
 /// Worlds of a scene that are set to given states and evaluated, in this process and on one thread.
 pub struct Evaluation {
     simulation: Simulation,
+    eyes: Eyes,
     arrays: Arrays,
 }
 
 impl Evaluation {
-    /// So many worlds of a scene as TOML, with paths relative to a folder, and frames of `fields`.
+    /// So many worlds of a scene as TOML, with paths relative to a folder, and frames of the fields asked for.
     ///
     /// # Errors
     /// A scene that is not valid, or whose files cannot be read; memory.
@@ -25,22 +26,28 @@ impl Evaluation {
         folder: &Path,
         worlds: usize,
         precision: Precision,
-        fields: &[Field],
+        asked: &FrameFields,
     ) -> Result<Evaluation, DaemonError> {
-        let model = config::parse(scene, "scene")?.describe(folder)?.compile()?;
+        let mut scene = config::parse(scene, "scene")?;
+        scene.cameras.extend(asked.cameras.iter().cloned());
+        let description = scene.describe(folder)?;
+        let model = description.compile()?;
+        let sight = Sight::open(&scene, folder, &description, &model, &asked.images)?;
         let options = Options {
             worlds,
             precision,
             threads: Some(1),
-            fields: fields.to_vec(),
+            fields: asked.fields.clone(),
             // it never steps
             compiles: false,
             ..Options::default()
         };
         let simulation = Simulation::new(model, &options)?;
+        let eyes = Eyes::alone(&Images::new(sight, simulation.layout())?, &simulation)?;
         Ok(Evaluation {
-            arrays: Arrays::new(&simulation),
+            arrays: Arrays::new(&simulation, eyes.images()),
             simulation,
+            eyes,
         })
     }
 
@@ -59,6 +66,7 @@ impl Evaluation {
             problem: error.to_string(),
         })?;
         self.simulation.forward(self.arrays.arena());
+        self.eyes.draw(&self.simulation, self.arrays.arena());
         Ok(&self.arrays)
     }
 }

@@ -4,6 +4,8 @@
 mod evaluation;
 
 pub use crate::export::arrays::{Array, Arrays};
+pub use crate::eyes::FrameFields;
+
 pub use evaluation::Evaluation;
 pub use sim_engine::simulation::Precision;
 pub use sim_physics::arrays::Field;

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use sim_engine::options::{Adapter, cache_folder};
 use sim_engine::simulation::Device;
-use sim_physics::arrays::Field;
 use sim_protocol::{Description, Op};
 
 use super::entries::{Entries, Entry};
@@ -16,6 +15,7 @@ use super::run::{Head, Run};
 use crate::error::DaemonError;
 use crate::export::Advance;
 use crate::export::arrays::Arrays;
+use crate::eyes::FrameFields;
 
 /// What a frame of a playback shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl Playback {
     /// A file that cannot be read or is no recording; a scene whose robots and meshes are not where they were.
     pub fn open(
         path: &Path,
-        fields: &[Field],
+        fields: &FrameFields,
         threads: Option<usize>,
     ) -> Result<Playback, DaemonError> {
         let mut entries = Entries::open(path)?;
@@ -62,7 +62,7 @@ impl Playback {
             _ => return Err(unreadable(path, "ends before its head; copy it again")),
         };
         let bytes = entries.bytes;
-        let open = |device| Run::open(path, bytes, &head, fields.to_vec(), device, threads);
+        let open = |device| Run::open(path, bytes, &head, fields, device, threads);
         let (run, note) = match head.daemon.adapter.as_str() {
             "" => (open(Device::Cpu)?, None),
             name => {
@@ -83,7 +83,7 @@ impl Playback {
         };
         Ok(Playback {
             entries,
-            arrays: Arrays::new(&run.simulation),
+            arrays: Arrays::new(&run.simulation, run.eyes.images()),
             description: head.daemon,
             run,
             frames: 0,

@@ -287,12 +287,12 @@ impl Compared {
                 cache: cache_folder(),
             },
         };
-        let run = Run::open(path, bytes, &head, head.fields(path)?, device, threads)?;
-        let table = export::frame_table(run.simulation.layout());
+        let run = Run::open(path, bytes, &head, &head.fields(path)?, device, threads)?;
+        let table = export::frame_table(run.simulation.layout(), run.eyes.images());
         let is_observed = |row: &&Row| head.observed.contains(&row.name);
         Ok(Compared {
             observed: table.rows().iter().filter(is_observed).cloned().collect(),
-            arena: vec![0; run.simulation.layout().bytes.div_ceil(8)],
+            arena: vec![0; run.eyes.images().arena_bytes().div_ceil(8)],
             digests: vec![0; digests_of(&table)],
             table,
             run,

@@ -8,7 +8,6 @@ use sim_engine::simulation::{
     Device, Draws, Faults, Lanes, Options, OutputsAt, Precision, Simulation,
 };
 use sim_model::Model;
-use sim_physics::arrays::Field;
 use sim_protocol::host::{Inbox, free_memory};
 use sim_protocol::{CommandHeader, Description, Op};
 
@@ -18,6 +17,7 @@ use super::records::RecordedCommand;
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, Advance, RunInfo};
+use crate::eyes::{Eyes, FrameFields, Images, Sight};
 
 /// Counts above this are damage; below it, sizes in bytes do not overflow.
 const WORLDS_MAX: usize = u32::MAX as usize;
@@ -53,13 +53,10 @@ impl Head {
     }
 
     /// The fields of the frames that were recorded.
-    pub(super) fn fields(&self, path: &Path) -> Result<Vec<Field>, DaemonError> {
-        let named = self.daemon.fields.iter().map(|field| {
-            let unknown =
-                || unreadable(path, format!("has a field `{}`, unknown here", field.name));
-            Field::named(&field.name).ok_or_else(unknown)
-        });
-        named.collect()
+    pub(super) fn fields(&self, path: &Path) -> Result<FrameFields, DaemonError> {
+        let names = self.daemon.fields.iter().map(|field| field.name.as_str());
+        FrameFields::named(names)
+            .map_err(|name| unreadable(path, format!("has a field `{name}`, unknown here")))
     }
 }
 
@@ -76,6 +73,7 @@ fn state_min(model: &Model, options: &Options) -> u64 {
 /// The worlds of a recording.
 pub(super) struct Run {
     pub(super) simulation: Simulation,
+    pub(super) eyes: Eyes,
     inbox: Inbox,
     mask: Vec<bool>,
     /// They are where the recording begins.
@@ -88,21 +86,22 @@ impl Run {
         path: &Path,
         bytes: u64,
         head: &Head,
-        fields: Vec<Field>,
+        asked: &FrameFields,
         device: Device,
         threads: Option<usize>,
     ) -> Result<Run, DaemonError> {
         let failed = |problem: String| unreadable(path, problem);
         let daemon = &head.daemon;
         let scene = config::parse(&daemon.scene, "of the recording");
-        let scene = scene.map_err(|error| failed(error.to_string()))?;
-        let description = scene.describe(Path::new(&daemon.scene_folder));
-        let description = description.map_err(|error| {
+        let mut scene = scene.map_err(|error| failed(error.to_string()))?;
+        scene.cameras.extend(asked.cameras.iter().cloned());
+        let described = scene.describe(Path::new(&daemon.scene_folder));
+        let described = described.map_err(|error| {
             failed(format!(
                 "needs the scene's robots and meshes where they were: {error}"
             ))
         })?;
-        let model = description
+        let model = described
             .compile()
             .map_err(|error| failed(error.to_string()))?;
         if model.hash() != daemon.model_hash {
@@ -123,6 +122,8 @@ impl Run {
                 "is of another model ({then:016x}, here {now:016x}): {cause}"
             )));
         }
+        let folder = Path::new(&daemon.scene_folder);
+        let sight = Sight::open(&scene, folder, &described, &model, &asked.images)?;
         let options = Options {
             device,
             compile_limit: compile_limit()?,
@@ -134,7 +135,7 @@ impl Run {
             },
             threads,
             lanes: Lanes::Auto,
-            fields,
+            fields: asked.fields.clone(),
             faults: Faults {
                 joint_q_max: daemon.joint_q_max.unwrap_or(f64::INFINITY),
                 joint_qd_max: daemon.joint_qd_max.unwrap_or(f64::INFINITY),
@@ -155,7 +156,8 @@ impl Run {
                 daemon.worlds
             )));
         }
-        let frame = Simulation::layout_of(&model, &options).bytes as u64;
+        let images = Images::new(sight, &Simulation::layout_of(&model, &options))?;
+        let frame = (images.arena_bytes() as u64).saturating_add(images.memory_bytes());
         let needed = frame.saturating_add(Simulation::memory_of(&model, &options));
         let free = free_memory();
         if needed > free {
@@ -165,14 +167,16 @@ impl Run {
         }
         let simulation =
             Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
+        let eyes = Eyes::alone(&images, &simulation)?;
         let info = RunInfo {
-            scene: &description,
+            scene: &described,
             scene_text: String::new(),
             scene_folder: String::new(),
             device: String::new(),
             threads: 1,
             frames_held: 1,
             watch_worlds: 1,
+            images: &images,
         };
         // what commands may have follows from the model, whatever the head says
         let description =
@@ -181,6 +185,7 @@ impl Run {
             inbox: Inbox::for_commands_of(&description),
             mask: Vec::with_capacity(daemon.worlds),
             simulation,
+            eyes,
             has_state: false,
         })
     }
@@ -237,5 +242,6 @@ impl Run {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
+        self.eyes.draw(&self.simulation, arena);
     }
 }

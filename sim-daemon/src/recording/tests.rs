@@ -15,6 +15,7 @@ use crate::cli::Replay;
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
+use crate::eyes::Images;
 
 mod earlier;
 mod gaps;
@@ -49,6 +50,7 @@ fn record() -> Recording {
         ..Options::default()
     };
     let mut simulation = Simulation::new(model, &options).unwrap();
+    let images = Images::none(simulation.layout());
     let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
@@ -57,6 +59,7 @@ fn record() -> Recording {
         threads: 1,
         frames_held: 1,
         watch_worlds: 1,
+        images: &images,
     };
     let announced = export::description(simulation.model(), &options, simulation.layout(), info);
     let head = serde_json::json!({ "daemon": announced, "observed": ["joint_q"] }).to_string();
@@ -64,7 +67,7 @@ fn record() -> Recording {
     Record::Head(head.as_bytes()).write(&mut first);
     Record::State(&simulation.snapshot()).write(&mut state);
     let mut blocks = vec![first, state];
-    let frame = export::frame_table(simulation.layout());
+    let frame = export::frame_table(simulation.layout(), &images);
     let mut arena = vec![0; simulation.layout().bytes / 8];
     let mut digests = vec![0; digests_of(&frame)];
     let table = torques();

@@ -9,6 +9,7 @@ use sim_protocol::{Op, RefusalKind};
 use crate::error::DaemonError;
 use crate::export::refusal::{Refusal, refusal};
 use crate::export::{self, Advance};
+use crate::eyes::Eyes;
 use crate::serve::device_memory;
 use crate::serve::fault_log::FaultLog;
 use crate::serve::ik::Ik;
@@ -22,17 +23,19 @@ mod tests;
 /// Serves until somebody asks to end.
 pub(crate) fn run(
     mut simulation: Simulation,
+    mut eyes: Eyes,
     host: &mut Host,
     log: &Log,
 ) -> Result<(), DaemonError> {
     let mut faults = FaultLog::default();
-    let result = serve(&mut simulation, host, log, &mut faults);
+    let result = serve(&mut simulation, &mut eyes, host, log, &mut faults);
     faults.end(&mut simulation, log);
     result
 }
 
 fn serve(
     simulation: &mut Simulation,
+    eyes: &mut Eyes,
     host: &mut Host,
     log: &Log,
     faults: &mut FaultLog,
@@ -56,7 +59,7 @@ fn serve(
                 let mut applied = match lost(simulation) {
                     Some(refusal) => Err(refusal),
                     None if host.inbox().op() == Op::Rollout => {
-                        rollouts.answer(simulation, host, watched)
+                        rollouts.answer(simulation, eyes, host, watched)
                     }
                     None => apply(simulation, host, &mut mask, &mut ik),
                 };
@@ -71,6 +74,7 @@ fn serve(
                     Ok(advance) => {
                         let mut shown = Shown {
                             simulation,
+                            eyes,
                             advance,
                             watched,
                         };
@@ -90,9 +94,10 @@ fn serve(
                 // a lost device has no worlds to advance; the next command gets the error
                 if lost(simulation).is_none() && apply(simulation, host, &mut mask, &mut ik).is_ok()
                 {
-                    scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
+                    scratch.resize(eyes.images().arena_bytes().div_ceil(8), 0);
                     let mut shown = Shown {
                         simulation,
+                        eyes,
                         advance: Advance::Step,
                         watched,
                     };
@@ -104,9 +109,10 @@ fn serve(
             }
             Next::Observe => {
                 // nobody steps now, so there is time to evaluate what observers have not seen
-                scratch.resize(simulation.layout().bytes.div_ceil(8), 0);
+                scratch.resize(eyes.images().arena_bytes().div_ceil(8), 0);
                 let mut shown = Shown {
                     simulation,
+                    eyes,
                     advance: Advance::Forward,
                     watched,
                 };

@@ -21,6 +21,7 @@ use crate::cli::Serve;
 use crate::config::{self, SceneFile};
 use crate::error::DaemonError;
 use crate::export::{self, RunInfo};
+use crate::eyes::{Eyes, FrameFields, Images, Sight};
 use crate::perf_map;
 use crate::serve::groups;
 use crate::serve::janitor::Janitor;
@@ -97,7 +98,7 @@ fn run_with(
         door.lock()
             .unwrap_or_else(PoisonError::into_inner)
             .open(&host)?;
-        let result = server::run(group.simulation, &mut host, &log);
+        let result = server::run(group.simulation, group.eyes, &mut host, &log);
         // now: we may be ended while another group is at long work
         if let (Err(error), false) = (&result, is_alone) {
             log.write(&format!("failed: {error}"));
@@ -129,6 +130,7 @@ struct Opened {
 struct Group {
     daemon_lock: DaemonLock,
     simulation: Simulation,
+    eyes: Eyes,
     announced: Description,
     table: Table,
 }
@@ -208,7 +210,7 @@ impl Door<'_> {
 /// Everything before the first client may come, except the services.
 fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     // of each group
-    let mut options = check(serve)?;
+    let (mut options, images) = check(serve)?;
     let refusals = pace::ask_system(serve)?;
     let count = serve.groups as usize;
     let paths = DaemonPaths::new(None, &serve.name)?;
@@ -249,33 +251,42 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     check_least_memory(&description, &options, count)?;
     let model = description.compile()?;
     options.checked_with = options::machine_code_check(&model);
+    let sight = Sight::open(&scene, &folder, &description, &model, &images)?;
+    let unseen: Vec<_> = sight.iter().flat_map(|sight| sight.notes.clone()).collect();
     let layout = Simulation::layout_of(&model, &options);
-    let table = export::frame_table(&layout);
+    let images = Images::new(sight, &layout)?;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = options.threads.unwrap_or_else(cores);
+    let table = export::frame_table(&layout, &images);
     let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
         scene_folder: folder.to_string_lossy().into_owned(),
         device: "cpu".to_owned(),
-        threads: options.threads.unwrap_or_else(cores),
+        threads,
         frames_held: serve.frames_held,
         watch_worlds: serve.watch_worlds,
+        images: &images,
     };
     let mut announced = export::description(&model, &options, &layout, info);
     announced.groups = count;
     // before anything large is taken: memory that is missing kills instead of failing
-    check_memory(&announced, &table, Simulation::memory_of(&model, &options))?;
+    let own = Simulation::memory_of(&model, &options).saturating_add(images.memory_bytes());
+    check_memory(&announced, &table, own)?;
     announced.warnings = advice(&description, &model);
     announced.pace = pace::pace(serve, model.dt() * model.substeps() as f64)?;
     announced.notes.extend(refusals);
+    announced.notes.extend(unseen);
     let simulations = Simulation::groups(model, &options, count)?;
+    let eyes = Eyes::of_groups(&images, threads, count)?;
     announced.notes.extend(pace::lock_memory(serve));
     announced.notes.extend(perf_map::write(&simulations[0]));
     announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
     announced.watch_state_bytes = simulations[0].snapshot_bytes(announced.watch_worlds) as u64;
     // again with what observers see, of all groups before the first one opens; the worlds have their memory
     check_memory(&announced, &table, 0)?;
-    let group = |(number, (daemon_lock, simulation)): (usize, (DaemonLock, Simulation))| {
+    let group = |(number, ((daemon_lock, simulation), eyes))| {
+        let (daemon_lock, simulation): (DaemonLock, Simulation) = (daemon_lock, simulation);
         let mut announced = announced.clone();
         (announced.group, announced.first_world) = (number, number * options.worlds);
         (announced.device, announced.threads) =
@@ -288,19 +299,20 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
         Group {
             daemon_lock,
             simulation,
+            eyes,
             announced,
             table: table.clone(),
         }
     };
-    let groups = locks.into_iter().zip(simulations);
+    let groups = locks.into_iter().zip(simulations).zip(eyes);
     Ok(Opened {
         daemon,
         groups: groups.enumerate().map(group).collect(),
     })
 }
 
-/// The arguments, checked; the worlds are those of each group.
-fn check(serve: &Serve) -> Result<Options, DaemonError> {
+/// The arguments, checked, with the fields of cameras; the worlds are those of each group.
+fn check(serve: &Serve) -> Result<(Options, Vec<String>), DaemonError> {
     let wrong = |argument, value: &dyn ToString, problem: String| {
         let value = value.to_string();
         Err(DaemonError::Argument {
@@ -372,23 +384,18 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
             "ask for at least 1".to_owned(),
         );
     }
-    let mut fields = Vec::new();
-    for name in serve
-        .fields
-        .iter()
-        .map(|name| name.trim())
-        .filter(|name| !name.is_empty())
-    {
-        let Some(field) = Field::named(name) else {
+    let names = serve.fields.iter().map(|name| name.trim());
+    let asked = match FrameFields::named(names.filter(|name| !name.is_empty())) {
+        Ok(asked) => asked,
+        Err(name) => {
             let known: Vec<_> = Field::ALL.iter().map(|field| field.row().name).collect();
             return wrong(
                 "fields",
                 &name,
                 format!("unknown field; known are {}", known.join(", ")),
             );
-        };
-        fields.push(field);
-    }
+        }
+    };
     if !matches!(serve.on_fault.as_str(), "freeze" | "reset") {
         let problem = "unknown; use freeze or reset".to_owned();
         return wrong("on-fault", &serve.on_fault, problem);
@@ -415,14 +422,14 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         }
     }
     let (worlds, threads) = ((serve.worlds / serve.groups) as usize, serve.threads);
-    Ok(Options {
+    let options = Options {
         device,
         compile_limit: options::compile_limit()?,
         worlds,
         precision,
         threads,
         lanes: Lanes::Auto,
-        fields,
+        fields: asked.fields,
         faults: Faults {
             joint_q_max: serve.joint_q_max,
             joint_qd_max: serve.joint_qd_max,
@@ -432,7 +439,8 @@ fn check(serve: &Serve) -> Result<Options, DaemonError> {
         draws,
         outputs_at,
         ..Options::default()
-    })
+    };
+    Ok((options, asked.images))
 }
 
 /// What is to keep the worlds; none if the word is unknown.

@@ -8,10 +8,12 @@ use sim_engine::simulation::Simulation;
 use sim_protocol::host::{FrameMemory, Pages, Worlds};
 
 use crate::export::Advance;
+use crate::eyes::Eyes;
 
 /// The worlds, for a frame.
 pub(crate) struct Shown<'a> {
     pub(crate) simulation: &'a mut Simulation,
+    pub(crate) eyes: &'a mut Eyes,
     pub(crate) advance: Advance,
     /// Worlds that observers see.
     pub(crate) watched: usize,
@@ -30,6 +32,7 @@ impl Worlds for Shown<'_> {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
+        self.eyes.draw(self.simulation, arena);
         self.simulation.lost().is_none()
     }
 

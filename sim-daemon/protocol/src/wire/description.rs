@@ -87,6 +87,9 @@ pub struct Description {
     pub followers: Vec<Follower>,
     /// Rows of the field table: what every frame carries, in this order.
     pub fields: Vec<FieldInfo>,
+    /// What the labels of segmentation stand for: bodies, then parts of the world. Older recordings have none.
+    #[serde(default)]
+    pub segment_names: Vec<String>,
     /// Every row that could have been asked for.
     pub known_fields: Vec<FieldInfo>,
     /// What a step may set (`joint_f`, targets).

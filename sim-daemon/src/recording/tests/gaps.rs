@@ -7,6 +7,7 @@ use super::super::replay::{End, Gap, open};
 use super::super::{Playback, Shows, replay as run};
 use super::{FRAMES, Recording, file, record, torques};
 use crate::cli::Replay;
+use crate::eyes::FrameFields;
 
 /// A recording whose frames from `first` to `last` are a gap, with the state behind it or without.
 fn with_gap(first: usize, last: usize, has_state: bool) -> Recording {
@@ -107,7 +108,8 @@ fn a_playback_goes_on_behind_a_gap() {
     ] {
         let path = file("played-gap");
         std::fs::write(&path, with_gap(3, 7, has_state).bytes().0).unwrap();
-        let mut playback = Playback::open(&path, &[Field::JointQ], Some(1)).unwrap();
+        let fields = FrameFields::from(&[Field::JointQ][..]);
+        let mut playback = Playback::open(&path, &fields, Some(1)).unwrap();
         let mut played = 0;
         while playback.advance().unwrap().is_some() {
             played += 1;
@@ -121,7 +123,7 @@ fn a_playback_goes_on_behind_a_gap() {
 fn a_playback_with_starts_shows_the_states_that_no_command_made() {
     let path = file("played-starts");
     std::fs::write(&path, with_gap(3, 7, true).bytes().0).unwrap();
-    let played = Playback::open(&path, &[Field::JointQ], Some(1)).unwrap();
+    let played = Playback::open(&path, &FrameFields::from(&[Field::JointQ][..]), Some(1)).unwrap();
     let mut playback = played.with_starts();
     let mut shown = Vec::new();
     while playback.advance().unwrap().is_some() {

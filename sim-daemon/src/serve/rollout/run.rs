@@ -16,6 +16,7 @@ use super::question::Asked;
 use super::steps::Steps;
 use crate::export::refusal::{Refusal, refusal};
 use crate::export::{self, Advance, snapshot};
+use crate::eyes::Eyes;
 use crate::serve::exchange::Exchange;
 use crate::serve::shown::Shown;
 
@@ -34,6 +35,7 @@ impl Rollouts {
     pub(crate) fn answer(
         &mut self,
         simulation: &mut Simulation,
+        eyes: &mut Eyes,
         host: &mut Host,
         watched: usize,
     ) -> Result<Advance, Refusal> {
@@ -44,7 +46,7 @@ impl Rollouts {
         let exchange = Exchange::read(Path::new(&path), 4).map_err(in_file)?;
         let (epoch, seq) = (host.inbox().header().epoch, host.inbox().header().seq);
         let follows = left == Some((epoch, seq.wrapping_sub(1)));
-        let bytes = self.carry_out(&exchange, follows, simulation, host, watched)?;
+        let bytes = self.carry_out(&exchange, follows, (simulation, eyes), host, watched)?;
         exchange.answer(&bytes).map_err(in_file)?;
         self.left = Some((epoch, seq));
         Ok(advance)
@@ -56,7 +58,7 @@ impl Rollouts {
         &mut self,
         exchange: &Exchange,
         follows: bool,
-        simulation: &mut Simulation,
+        (simulation, eyes): (&mut Simulation, &mut Eyes),
         steps: &mut impl Steps,
         watched: usize,
     ) -> Result<Vec<u8>, Refusal> {
@@ -65,13 +67,15 @@ impl Rollouts {
         // a rollout comes in pieces, or goes on with memory: an evaluation between them might reset faulted worlds
         let is_next = asked.question.first > 0 || !asked.memory.is_empty();
         if !(is_next && follows) {
-            self.arena.resize(simulation.layout().bytes.div_ceil(8), 0);
+            self.arena
+                .resize(eyes.images().arena_bytes().div_ceil(8), 0);
             // the policy sees the present state, which no frame may have shown
             simulation.forward(&mut self.arena);
+            eyes.draw(simulation, &mut self.arena);
         }
         match simulation.precision() {
-            Precision::F32 => self.run::<f32>(&asked, simulation, steps, watched),
-            Precision::F64 => self.run::<f64>(&asked, simulation, steps, watched),
+            Precision::F32 => self.run::<f32>(&asked, (simulation, eyes), steps, watched),
+            Precision::F64 => self.run::<f64>(&asked, (simulation, eyes), steps, watched),
         }
     }
 
@@ -91,13 +95,13 @@ impl Rollouts {
     fn run<R: Real>(
         &mut self,
         asked: &Asked,
-        simulation: &mut Simulation,
+        (simulation, eyes): (&mut Simulation, &mut Eyes),
         steps: &mut impl Steps,
         watched: usize,
     ) -> Result<Vec<u8>, Refusal> {
         let refuse = |problem: String| refused(&problem);
         let (worlds, threads) = (simulation.worlds(), simulation.threads());
-        let table = export::frame_table(simulation.layout());
+        let table = export::frame_table(simulation.layout(), eyes.images());
         let mut observation = Observation::<R>::find(asked, &table).map_err(refuse)?;
         let commands = Commands::find(asked, steps.description()).map_err(refuse)?;
         let actions = asked.network.outputs();
@@ -133,7 +137,13 @@ impl Rollouts {
         steps.put_aside();
         let frames = asked.question.frames;
         let result = (0..frames).try_for_each(|frame| {
-            let step = rollout.step(frame, simulation, steps, &mut self.arena, &mut self.mask);
+            let step = rollout.step(
+                frame,
+                (simulation, eyes),
+                steps,
+                &mut self.arena,
+                &mut self.mask,
+            );
             step.map_err(|mut refusal| {
                 let frame = asked.question.first.saturating_add(frame);
                 refusal.reason = format!("rollout: frame {frame}: {}", refusal.reason);
@@ -188,7 +198,7 @@ impl<R: Real> Rollout<'_, R> {
     fn step(
         &mut self,
         frame: usize,
-        simulation: &mut Simulation,
+        (simulation, eyes): (&mut Simulation, &mut Eyes),
         steps: &mut impl Steps,
         arena: &mut [u64],
         mask: &mut Vec<bool>,
@@ -207,6 +217,7 @@ impl<R: Real> Rollout<'_, R> {
         }
         let mut shown = Shown {
             simulation,
+            eyes,
             advance: Advance::Step,
             watched: self.watched,
         };

@@ -21,6 +21,7 @@ use sim_protocol::{AttachOptions, Client, Frame, JournalEntry, ProtocolError, ke
 use crate::cli::{Record, Replay};
 use crate::config;
 use crate::export::{self, RunInfo};
+use crate::eyes::Eyes;
 use crate::printer::Printer;
 use crate::recording::{follow, replay};
 use crate::serve::log::Log;
@@ -42,6 +43,7 @@ fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
     };
     let simulation = Simulation::new(description.compile().unwrap(), &options).unwrap();
     layer::assert_watched();
+    let eyes = Eyes::none(&simulation);
     let info = RunInfo {
         scene: &description,
         scene_text: scene.to_toml(),
@@ -50,13 +52,14 @@ fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
         threads: 1,
         frames_held: 2,
         watch_worlds: 1,
+        images: eyes.images(),
     };
     let mut announced =
         export::description(simulation.model(), &options, simulation.layout(), info);
     announced.adapter = simulation.adapter().to_owned();
     announced.state_bytes = simulation.snapshot_bytes(3) as u64;
     announced.watch_state_bytes = simulation.snapshot_bytes(1) as u64;
-    let table = export::frame_table(simulation.layout());
+    let table = export::frame_table(simulation.layout(), eyes.images());
     let daemon_lock = DaemonLock::take(paths).unwrap();
     let mut host = Host::open(
         daemon_lock,
@@ -70,7 +73,7 @@ fn serve(paths: &DaemonPaths, log: &Path, runs: u64, ready: impl FnOnce()) {
     let log = Log::open(Some(log), true, &stderr).unwrap();
     lose_after(runs);
     ready();
-    super::run(simulation, &mut host, &log).unwrap();
+    super::run(simulation, eyes, &mut host, &log).unwrap();
     log.flush();
     host.client_cleanup().clean();
 }

@@ -1,0 +1,116 @@
+//! Draws the images of frames, on all threads.
+
+use sim_engine::backend::BackendError;
+use sim_engine::random::Episode;
+use sim_engine::simulation::Simulation;
+use sim_engine::workers::{PARTS_PER_THREAD, Workers};
+
+use super::images::Images;
+use super::memory::{Memory, State};
+use super::part::Part;
+use crate::error::DaemonError;
+
+/// The cameras of a group of worlds.
+pub(crate) struct Eyes {
+    images: Images,
+    /// None without images.
+    parts: Vec<Part>,
+    workers: Option<Workers>,
+    /// Of each world, where a camera is random.
+    episodes: Vec<Episode>,
+}
+
+impl Eyes {
+    /// No cameras.
+    pub(crate) fn none(simulation: &Simulation) -> Eyes {
+        Eyes {
+            images: Images::none(simulation.layout()),
+            parts: Vec::new(),
+            workers: None,
+            episodes: Vec::new(),
+        }
+    }
+
+    /// The cameras of groups of worlds, each with these images, which share threads.
+    ///
+    /// # Errors
+    /// Threads that the system does not start.
+    pub(crate) fn of_groups(
+        images: &Images,
+        threads: usize,
+        groups: usize,
+    ) -> Result<Vec<Eyes>, DaemonError> {
+        let workers = images.seen.as_ref().map(|_| {
+            let failed = |reason| BackendError::Threads { threads, reason };
+            Workers::new(threads, groups).map_err(failed)
+        });
+        let workers = workers.transpose()?;
+        let eyes = (0..groups).map(|_| Eyes::new(images.clone(), threads, workers.clone()));
+        Ok(eyes.collect())
+    }
+
+    /// The cameras of a simulation that shares no threads.
+    ///
+    /// # Errors
+    /// As [`Eyes::of_groups`].
+    pub(crate) fn alone(images: &Images, simulation: &Simulation) -> Result<Eyes, DaemonError> {
+        let mut eyes = Eyes::of_groups(images, simulation.threads(), 1)?;
+        Ok(eyes.remove(0))
+    }
+
+    fn new(images: Images, threads: usize, workers: Option<Workers>) -> Eyes {
+        let mut eyes = Eyes {
+            images,
+            parts: Vec::new(),
+            workers,
+            episodes: Vec::new(),
+        };
+        let Some(seen) = &eyes.images.seen else {
+            return eyes;
+        };
+        let worlds = seen.steps.shape[0];
+        let count = match threads {
+            1 => 1,
+            _ => (threads * PARTS_PER_THREAD).min(worlds),
+        };
+        let parts = (0..count).map(|part| {
+            let worlds = part * worlds / count..(part + 1) * worlds / count;
+            Part::new(&seen.sight, eyes.images.fields(), worlds)
+        });
+        eyes.parts = parts.collect();
+        if seen.sight.eyes.iter().any(|eye| eye.chance.is_random()) {
+            eyes.episodes = vec![Episode::default(); worlds];
+        }
+        eyes
+    }
+
+    /// What frames have of them.
+    pub(crate) fn images(&self) -> &Images {
+        &self.images
+    }
+
+    /// Draws the images of a frame, which has the arrays of this simulation already. Without cameras it does nothing.
+    ///
+    /// # Panics
+    /// The arena is smaller than [`Images::arena_bytes`].
+    pub(crate) fn draw(&mut self, simulation: &Simulation, arena: &mut [u64]) {
+        let (Some(seen), Some(workers)) = (&self.images.seen, &self.workers) else {
+            return;
+        };
+        let room = size_of_val(arena);
+        assert!(room >= self.images.arena_bytes(), "no room for images");
+        simulation.episodes(&mut self.episodes);
+        let (state, images) = arena.split_at_mut(seen.words);
+        let images = Memory::new(images, size_of_val(state));
+        let state = State {
+            bytes: bytemuck::cast_slice(state),
+            bodies: &seen.bodies,
+            steps: &seen.steps,
+            episodes: &self.episodes,
+        };
+        let fields = self.images.fields();
+        workers.for_each(&mut self.parts, |part| {
+            part.draw(&seen.sight, fields, &state, images);
+        });
+    }
+}

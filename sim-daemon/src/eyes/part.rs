@@ -1,0 +1,148 @@
+//! Some worlds, which one thread draws.
+
+use std::ops::Range;
+
+use sim_render::{Frame, Image, Scratch};
+
+use super::chance::Moment;
+use super::fields::{ImageField, Plane};
+use super::memory::{Memory, State};
+use super::sight::{Eye, Sight};
+
+/// Some worlds, which one thread draws.
+pub(super) struct Part {
+    worlds: Range<usize>,
+    scratch: Scratch,
+    /// Frames of a world's bodies.
+    frames: Vec<Frame>,
+    /// Depths of images of which other planes are asked for.
+    spare: Vec<f32>,
+    repeats: Vec<Repeat>,
+}
+
+/// The last images of a camera that draws none in some frames.
+struct Repeat {
+    /// Step of each world's; none before the first one.
+    drawn: Vec<Option<u64>>,
+    /// Images of each world, one after the other.
+    bytes: Vec<u8>,
+    of_world: usize,
+}
+
+impl Part {
+    pub(super) fn new(sight: &Sight, fields: &[ImageField], worlds: Range<usize>) -> Part {
+        let mut spare = 0;
+        let repeats = sight.eyes.iter().map(|eye| {
+            let own = fields.iter().filter(|field| field.camera == eye.number);
+            let of_world = own.map(|field| field.bytes() / field.shape[0]).sum();
+            spare = spare.max(eye.camera.width * eye.camera.height);
+            let kept = if eye.every > 1 { worlds.len() } else { 0 };
+            Repeat {
+                drawn: vec![None; kept],
+                bytes: vec![0; kept * of_world],
+                of_world,
+            }
+        });
+        Part {
+            repeats: repeats.collect(),
+            worlds,
+            scratch: Scratch::default(),
+            frames: Vec::with_capacity(sight.segments.len()),
+            spare: vec![0.0; spare],
+        }
+    }
+
+    pub(super) fn draw(
+        &mut self,
+        sight: &Sight,
+        fields: &[ImageField],
+        state: &State,
+        images: Memory,
+    ) {
+        for world in self.worlds.clone() {
+            state.frames(world, &mut self.frames);
+            for (place, eye) in sight.eyes.iter().enumerate() {
+                let moment = state.moment(world);
+                if eye.every == 1 {
+                    self.draw_image(sight, eye, fields, (world, moment), images);
+                    continue;
+                }
+                let steps = moment.step;
+                let own = world - self.worlds.start;
+                let drawn = self.repeats[place].drawn[own];
+                let is_due = steps.is_multiple_of(eye.every)
+                    || drawn
+                        .is_none_or(|then| then > steps || then / eye.every < steps / eye.every);
+                if is_due {
+                    self.draw_image(sight, eye, fields, (world, moment), images);
+                    self.repeats[place].drawn[own] = Some(steps);
+                }
+                let mine = fields.iter().filter(|field| field.camera == eye.number);
+                self.repeats[place].exchange(
+                    own,
+                    is_due,
+                    mine.map(|field| {
+                        // SAFETY: this world is ours alone, and so are its rows, one after the other
+                        unsafe { images.row::<u8>(field, world) }
+                    }),
+                );
+            }
+        }
+    }
+
+    fn draw_image(
+        &mut self,
+        sight: &Sight,
+        eye: &Eye,
+        fields: &[ImageField],
+        (world, moment): (usize, Moment),
+        images: Memory,
+    ) {
+        let own = fields.iter().filter(|field| field.camera == eye.number);
+        let plane = |plane| own.clone().find(|field| field.plane == plane);
+        let (depth, labels) = (plane(Plane::Depth), plane(Plane::Segmentation));
+        let rgb = plane(Plane::Rgb);
+        let frame = match eye.body {
+            Some(body) => self.frames[body].then(&eye.frame),
+            None => eye.frame,
+        };
+        let (frame, camera) = eye.chance.moved(&moment, &frame, &eye.camera);
+        let pixels = eye.camera.width * eye.camera.height;
+        let mut image = Image {
+            // SAFETY: this world is ours alone, and its rows are apart
+            depth: match depth {
+                Some(field) => unsafe { images.row(field, world) },
+                None => &mut self.spare[..pixels],
+            },
+            // SAFETY: as above
+            labels: labels.map(|field| unsafe { images.row(field, world) }),
+            // SAFETY: as above
+            rgb: rgb.map(|field| unsafe { images.row(field, world) }),
+        };
+        let (scratch, frames) = (&mut self.scratch, &self.frames);
+        (sight.draw)(&eye.scene, frames, &frame, &camera, scratch, &mut image);
+        if depth.is_some() {
+            eye.chance.add_noise(&moment, &camera, image.depth);
+        }
+    }
+}
+
+impl Repeat {
+    /// Keeps the images of a world if they are new, else repeats the last ones.
+    fn exchange<'a>(
+        &mut self,
+        world: usize,
+        are_new: bool,
+        images: impl Iterator<Item = &'a mut [u8]>,
+    ) {
+        let mut rest = &mut self.bytes[world * self.of_world..][..self.of_world];
+        for image in images {
+            let (kept, others) = rest.split_at_mut(image.len());
+            rest = others;
+            match are_new {
+                true => kept.copy_from_slice(image),
+                false => image.copy_from_slice(kept),
+            }
+        }
+    }
+}
