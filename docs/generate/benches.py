@@ -449,6 +449,26 @@ and targets are fetched from it. With tensors, both stay there.
             "max_us": "longest [µs]",
         },
     ),
+    "cameras": Bench(
+        "Cameras",
+        """Images of 64 × 64 pixels per second, drawn on one core. Sides take turns.
+
+- `panda`: the Panda of MuJoCo Menagerie over a table, from the other side. `g1`: the G1 of mjlab on rough ground.
+- The models have all of their meshes. Colours have the shadows of one light.
+- tightloop draws 1024 worlds in its daemon: the time of a frame with images, less that of one without.
+- MuJoCo's renderer draws with Mesa, one world after the other. Its shadow map of 4096² pixels takes most of the time of
+  an image in colour. MuJoCo-Warp draws 32 worlds on Warp's CPU device.
+""",
+        {
+            "scene": "scene",
+            "image": "image",
+            "side": "side",
+            "images_per_second": "images/s",
+            "least": "least",
+            "most": "most",
+            "asked": "asked",
+        },
+    ),
     "viewer": Bench(
         "Overhead of a viewer",
         """A loop steps 4096 worlds as fast as it can. A viewer shows 256 of them. `±` is one standard error.

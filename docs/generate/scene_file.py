@@ -122,6 +122,16 @@ TABLES = (
         "The field `height_scan` holds how high the frame is above the ground.",
     ),
     Table(
+        "[[camera]]",
+        "cameras.rs",
+        "CameraTable",
+        ("camera",),
+        '[[camera]]\nname = "a"\nwidth = 8\nheight = 8\n',
+        '[[robot]]\nname = "arm"\nurdf = "examples/assets/fr3/fr3_franka_hand.urdf"\n\n'
+        '[[camera]]\nname = "wrist"\nbody = "arm/fr3_hand"\npos = [0.05, 0, 0]\nwidth = 64\nheight = 64\nfov = 1.2\n',
+        "Images are fields of frames: `wrist_depth`, `wrist_segmentation` and `wrist_rgb`.",
+    ),
+    Table(
         "[randomize]",
         "randomize.rs",
         "RandomizeTable",
@@ -162,6 +172,7 @@ TYPES = {
     "PerDof<ModeName>": "word, or a list",
     "CombineName": "word",
     "ConeName": "word",
+    "SeesName": "word",
     "ShapeName": "word",
     "Named<DistributionTable>": "distributions by name",
     "Named<Named<DistributionTable>>": "distributions by name and part",

@@ -32,6 +32,10 @@ class Frame:
         UnknownField: The frame does not carry that field; the message lists those it carries.
     """
 
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """Images of cameras, such as ``wrist_depth``, ``(worlds, height, width)``."""
+        ...
+
     joint_q: NDArray[Any]
     """Joint positions [rad or m], ``(worlds, coords)``."""
     joint_qd: NDArray[Any]
@@ -320,6 +324,7 @@ class Playback:
         fields: Fields of its frames, besides those of every frame.
         starts: Whether the states at the beginning and behind gaps are frames, too.
         threads: Most threads of a step; all cores if left out.
+        cameras: Cameras besides those of the scene, as a JSON list of tables of a scene file.
 
     Raises:
         RecordingError: The file cannot be read or is no recording, or files of its scene are missing.
@@ -334,6 +339,7 @@ class Playback:
         *,
         starts: bool = False,
         threads: int | None = None,
+        cameras: str | None = None,
     ) -> None: ...
     def describe(self) -> str: ...
     @property

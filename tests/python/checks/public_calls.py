@@ -105,6 +105,22 @@ CALLS: dict[str, Call] = {
             "name": "name",
         },
     ),
+    "Scene.add_camera": of_scene(
+        "add_camera",
+        POSE
+        | {
+            "width": "count",
+            "height": "count",
+            "fov": "positive",
+            "body": "body",
+            "near": "positive",
+            "far": "positive",
+            "every": "count",
+            "name": "name",
+        },
+        width=8,
+        height=8,
+    ),
     "Scene.filter_contacts": of_scene("filter_contacts", {"a": "collidable", "b": "collidable"}, a="cube", b="cube"),
     "Scene.randomize": of_scene(
         "randomize",

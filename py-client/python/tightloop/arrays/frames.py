@@ -26,6 +26,9 @@ def unknown_field(name: str, carried: Sequence[str], known: Sequence[str]) -> Un
     there = f"frames of this run carry: {', '.join(carried)}"
     if name in known:
         return UnknownField(f"frames carry no `{name}`; add {name!r} to `fields` at launch. The {there}")
+    if name.endswith(("_depth", "_segmentation", "_rgb")):
+        cure = "images of a camera (`Scene.add_camera`) are fields if `launch(fields=...)` names them"
+        return UnknownField(f"frames carry no `{name}`; {cure}. The {there}")
     if near := nearest(name, carried):
         return UnknownField(f"there is no field `{name}`; did you mean `{near[0]}`? The {there}")
     if near := nearest(name, known):

@@ -6,7 +6,7 @@ import fnmatch
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from tightloop import _core
 from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import suggestion
-from tightloop.datasets.images import image_kind
 from tightloop.errors import ArgumentError, UnknownField
+from tightloop.scene.cameras.camera import Camera
+from tightloop.scene.scene import Scene
 
 #: Fields of the observations if none are named.
 FIELDS = ("joint_q", "joint_qd")
@@ -56,6 +57,7 @@ class Layout:
         worlds: Worlds of the recording that are exported.
         every: Control frames per frame of the dataset.
         fps: Frames per second of the dataset [1/s].
+        cameras: Cameras of the replay, besides those of the recorded scene.
     """
 
     info: Mapping[str, Any]
@@ -68,6 +70,7 @@ class Layout:
     worlds: tuple[int, ...]
     every: int
     fps: float
+    cameras: tuple[Camera, ...] = ()
 
     @property
     def period(self) -> float:
@@ -93,6 +96,7 @@ def layout(
     joints: Sequence[str] | None,
     worlds: int | Sequence[int] | None,
     fps: float | None,
+    cameras: Scene | None = None,
 ) -> Layout:
     """Check choices against a recording.
 
@@ -103,6 +107,7 @@ def layout(
         joints: As of `episodes`.
         worlds: As of `episodes`.
         fps: As of `episodes`.
+        cameras: As of `episodes`.
 
     Raises:
         ArgumentError: A choice is not valid; the message names it.
@@ -112,9 +117,11 @@ def layout(
     path = checks.path("export: recording", recording, error=ArgumentError)
     info: dict[str, Any] = json.loads(_core.Playback(path, 1, []).describe())
     chosen = _names("fields", fields)
-    known = {field["name"]: field for field in info["known_fields"]}
+    further = tuple(_cameras(cameras))
+    images: dict[str, dict[str, Any]] = {name: {} for camera in further for name in camera.fields}
+    known = images | {field["name"]: field for field in info["known_fields"]}
     for name in chosen:
-        if image_kind(name) is None and name not in known:
+        if name not in known:
             raise UnknownField(f"export: fields has {name!r}; {suggestion(name, list(known))}")
     columns = {name: _columns(info, known.get(name, {})) for name in {*known, *chosen}}
     commands = _action(path, info, action)
@@ -131,7 +138,16 @@ def layout(
         worlds=_worlds(info["worlds"], worlds),
         every=every,
         fps=rate,
+        cameras=further,
     )
+
+
+def _cameras(scene: Scene | None) -> Iterable[Camera]:
+    if scene is None:
+        return ()
+    if not isinstance(scene, Scene):
+        raise ArgumentError(f"export: cameras is {scene!r:.80}; give a tightloop.Scene with cameras")
+    return scene.cameras.values()
 
 
 def _names(what: str, given: str | Sequence[str]) -> tuple[str, ...]:

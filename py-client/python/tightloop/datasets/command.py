@@ -68,6 +68,9 @@ def parser() -> argparse.ArgumentParser:
         help="fewest steps of an episode; shorter ones are left out (default 1)",
     )
     made.add_argument(
+        "--cameras", metavar="FILE", help="scene file whose cameras see the replay, besides those of the recorded scene"
+    )
+    made.add_argument(
         "--task", metavar="TEXT", help="what the robot does, in words (default: the name of the recording)"
     )
     return made
@@ -88,6 +91,7 @@ def main(arguments: list[str]) -> int:
 
     try:
         from tightloop.datasets.exporting import export
+        from tightloop.scene.scene import Scene
 
         made = export(
             given.recording,
@@ -99,6 +103,7 @@ def main(arguments: list[str]) -> int:
             worlds=given.worlds,
             fps=given.fps,
             min_steps=given.min_steps,
+            cameras=None if given.cameras is None else Scene.load(given.cameras),
             task=given.task,
             progress=tell,
         )

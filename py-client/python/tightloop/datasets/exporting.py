@@ -17,6 +17,7 @@ from tightloop.datasets.choices import FIELDS, layout
 from tightloop.datasets.reading import PerStep, Reader, with_rewards
 from tightloop.datasets.writers import Writer, check_place
 from tightloop.errors import ArgumentError
+from tightloop.scene.scene import Scene
 
 #: Writers of the formats: module, class, and endings of a name; a LeRobot dataset is a folder.
 _WRITERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
@@ -60,6 +61,7 @@ def export(
     worlds: int | Sequence[int] | None = None,
     fps: float | None = None,
     min_steps: int = 1,
+    cameras: Scene | None = None,
     task: str | None = None,
     rewards: PerStep | None = None,
     dones: PerStep | None = None,
@@ -80,6 +82,7 @@ def export(
         worlds: As of `episodes`.
         fps: As of `episodes`.
         min_steps: As of `episodes`.
+        cameras: As of `episodes`.
         task: What the robot does, in words; the name of the recording if left out.
         rewards: Rewards of each step: a function of an `Episode`, or an array ``(steps,)`` for each episode. They are 0
             if left out.
@@ -106,7 +109,7 @@ def export(
     least = checks.integer("export: min_steps", min_steps, least=1, error=ArgumentError)
     source = checks.path("export: recording", recording, error=ArgumentError)
     task = source.stem if task is None else checks.text("export: task", task, error=ArgumentError)
-    chosen = layout(source, fields=fields, action=action, joints=joints, worlds=worlds, fps=fps)
+    chosen = layout(source, fields=fields, action=action, joints=joints, worlds=worlds, fps=fps, cameras=cameras)
     reader = Reader(source, chosen, least)
     writer: Writer = getattr(import_module(f"tightloop.datasets.{module}"), name)(path, chosen, task)
     try:

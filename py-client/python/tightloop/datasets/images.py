@@ -1,4 +1,4 @@
-"""Fields that are images: ``rgb/NAME``, ``depth/NAME`` and ``segmentation/NAME``, as cameras make them."""
+"""Fields that are images: ``NAME_rgb``, ``NAME_depth`` and ``NAME_segmentation``, as cameras make them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAYOUTS: dict[str, tuple[type[np.generic], int]] = {
 
 def image_kind(field: str) -> ImageKind | None:
     """Return what a field shows of a camera; None if it is no image."""
-    kind, _, camera = field.partition("/")
+    camera, _, kind = field.rpartition("_")
     match kind:
         case "rgb" | "depth" | "segmentation" if camera:
             return kind
@@ -30,8 +30,8 @@ def image_kind(field: str) -> ImageKind | None:
 
 
 def camera_name(field: str) -> str:
-    """Return the name of an image's camera, without slashes."""
-    return field.partition("/")[2].replace("/", "_")
+    """Return the name of an image's camera."""
+    return field.rpartition("_")[0]
 
 
 def check_image(field: str, values: NDArray[Any]) -> None:
@@ -44,7 +44,7 @@ def check_image(field: str, values: NDArray[Any]) -> None:
     Raises:
         ArgumentError: They are others than the field's name says.
     """
-    dtype, axes = _LAYOUTS[field.partition("/")[0]]
+    dtype, axes = _LAYOUTS[field.rpartition("_")[2]]
     if values.dtype != dtype or values.ndim != 1 + axes:
         raise ArgumentError(
             f"export: field {field} is {values.dtype} of shape {values.shape}; images of that name are "

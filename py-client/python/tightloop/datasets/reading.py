@@ -7,6 +7,7 @@ observation is of the frame before, the action is the command that the step held
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.datasets.choices import FIELDS, Layout, layout
 from tightloop.datasets.images import check_image, image_kind
 from tightloop.errors import ArgumentError
+from tightloop.scene.scene import Scene
 
 Array = NDArray[Any]
 
@@ -96,6 +98,7 @@ def episodes(
     worlds: int | Sequence[int] | None = None,
     fps: float | None = None,
     min_steps: int = 1,
+    cameras: Scene | None = None,
 ) -> Iterator[Episode]:
     """Replay a recording, and return its episodes as they end.
 
@@ -111,13 +114,14 @@ def episodes(
         worlds: How many worlds, the first ones; or a list of them; all if left out.
         fps: Frames per second, of which the control rate is a multiple. The first command of a frame is its action.
         min_steps: Fewest steps of an episode; shorter ones are left out.
+        cameras: A scene whose cameras see the replay, besides those of the recorded scene. Nothing else of it counts.
 
     Raises:
         ArgumentError: An argument is not valid; the message names it.
         RecordingError: The recording cannot be read.
         UnknownField: There is no such field.
     """
-    chosen = layout(recording, fields=fields, action=action, joints=joints, worlds=worlds, fps=fps)
+    chosen = layout(recording, fields=fields, action=action, joints=joints, worlds=worlds, fps=fps, cameras=cameras)
     least = checks.integer("episodes: min_steps", min_steps, least=1, error=ArgumentError)
     return Reader(recording, chosen, least).episodes()
 
@@ -165,7 +169,9 @@ class Reader:
         self._layout, self._min_steps = chosen, min_steps
         path = checks.path("export: recording", recording, error=ArgumentError)
         self._worlds = np.asarray(chosen.worlds)
-        self._playback = _core.Playback(path, int(self._worlds.max()) + 1, chosen.replayed, starts=True)
+        cameras = json.dumps([camera.table() for camera in chosen.cameras])
+        count = int(self._worlds.max()) + 1
+        self._playback = _core.Playback(path, count, chosen.replayed, starts=True, cameras=cameras)
         self.note = self._playback.note
         self.frames = 0
         # the frames that open episodes need, and the number of the first one

@@ -80,7 +80,8 @@ class Card:
         self._stride: int = there["stride"]
         self._fields = {
             field["name"]: (offset, tuple(field["shape"]), np.dtype(_NUMPY[field["dtype"]]))
-            for field, offset in zip(info["fields"], there["offsets"], strict=True)
+            # images of cameras come last, and are in the memory of the host alone
+            for field, offset in zip(info["fields"], there["offsets"], strict=False)
         }
         self._parts = {field["name"]: _parts(field["axes"]) for field in info["known_fields"]}
         self._commands = {place["name"]: (1 << bit, place) for bit, place in enumerate(there["commands"])}
@@ -103,6 +104,10 @@ class Card:
             slot: The slot.
             done: Value of the timeline of frames then.
         """
+        if name not in self._fields:
+            raise GpuMemoryError(
+                f"`{name}` is drawn by the CPU, and is not on the GPU: copy it with `frame.{name}.copy()`"
+            )
         self._memory.wait_for_frame(done, self._stream())
         offset, shape, dtype = self._fields[name]
         return CardArray(self, sample, self._memory.pointer + slot * self._stride + offset, shape, dtype)

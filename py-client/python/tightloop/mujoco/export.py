@@ -109,6 +109,7 @@ _NAMED = {
     "actuator": "nactuator",
     "key": "nkey",
     "sensor": "nsensor",
+    "camera": "ncam",
 }
 _REAL_OPTIONS = (
     *("timestep", "gravity", "tolerance", "ls_tolerance", "noslip_tolerance", "ccd_tolerance", "impratio"),
@@ -194,7 +195,7 @@ def arrays(model: Any) -> dict[str, NDArray[Any]]:
         found[f"{name}.names"] = as_bytes([members[value] for value in used])
     text = bytes(model.names)
     for kind, count in _NAMED.items():
-        short = {"joint": "jnt", "equality": "eq"}.get(kind, kind)
+        short = {"joint": "jnt", "equality": "eq", "camera": "cam"}.get(kind, kind)
         starts = getattr(model, f"name_{short}adr")
         own = [text[start : text.index(b"\0", start)].decode(errors="replace") for start in starts]
         assert len(own) == getattr(model, count)

@@ -75,6 +75,11 @@ class MujocoModel(Entity):
         return list(self._summary["geom_names"])
 
     @property
+    def cameras(self) -> dict[str, dict[str, Any]]:
+        """The model's cameras by name: ``link``, ``pos``, ``quat``, ``resolution``, and ``fov`` or ``focal``."""
+        return {camera["name"]: camera for camera in self._summary["cameras"]}
+
+    @property
     def tendon_names(self) -> list[str]:
         """Names of the tendons, in the order of ``ten_length``."""
         return list(self._summary["tendon_names"])

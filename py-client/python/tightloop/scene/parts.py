@@ -10,6 +10,7 @@ from tightloop.checks.attributes import nearest
 from tightloop.errors import SceneError
 from tightloop.mujoco.model import MujocoModel
 from tightloop.scene.body import Body
+from tightloop.scene.cameras.camera import Camera
 from tightloop.scene.robot import Link, Robot
 from tightloop.scene.sensors import ContactSensor, HeightScan, Site
 from tightloop.scene.shapes import Shape
@@ -28,6 +29,7 @@ class Parts(Protocol):
     sites: dict[str, Site]
     contact_sensors: dict[str, ContactSensor]
     height_scans: dict[str, HeightScan]
+    cameras: dict[str, Camera]
 
 
 def part_names(scene: Parts) -> Collection[str]:

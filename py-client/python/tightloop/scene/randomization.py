@@ -15,6 +15,7 @@ from tightloop.scene.parts import Parts
 from tightloop.scene.robot import Robot
 
 _POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+_CAMERA = (*_POSE, "focal")
 _VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
 #: Parts as they are called elsewhere.
 _PARTS_MEANT = {"rx": ["roll"], "ry": ["pitch"], "rz": ["yaw"], "theta": ["yaw"], "heading": ["yaw"]}
@@ -35,6 +36,7 @@ def checked(
     body_q: BodyOffsets | None,
     body_qd: BodyOffsets | None,
     params: ParamRanges | None,
+    cameras: BodyOffsets | None,
 ) -> dict[str, dict[str, Any]]:
     """Check the arguments of `Scene.randomize`; return tables of distributions by field and name.
 
@@ -46,6 +48,7 @@ def checked(
         "joint_qd": _joints(scene, "joint_qd", joint_qd),
         "body_q": _bodies(scene, "body_q", body_q, _POSE),
         "body_qd": _bodies(scene, "body_qd", body_qd, _VELOCITY),
+        "cameras": _cameras(scene, cameras),
         "params": _ranges(params),
     }
 
@@ -120,6 +123,20 @@ def _check_body(scene: Parts, what: str, name: str) -> None:
     if joint not in floating and ("/" in name or len(floating) > 1):
         names = [f"{robot}/{joint}" for joint in floating]
         raise SceneError(f"{what}: name one of the floating joints: {_some(names)}")
+
+
+def _cameras(scene: Parts, offsets: BodyOffsets | None) -> dict[str, Any]:
+    tables = {}
+    for name, given in _items("randomize: cameras", offsets):
+        what = f"randomize: cameras of {name!r}"
+        if name not in scene.cameras:
+            raise SceneError(f"{what}: there is no such camera; {_meant(name, [*scene.cameras])}")
+        tables[name] = {}
+        for part, distribution in _items(what, given):
+            if part not in _CAMERA:
+                raise SceneError(f"{what}: there is no part {part!r}; use {', '.join(_CAMERA)}")
+            tables[name][part] = _table(f"{what}, {part}", distribution)
+    return tables
 
 
 def _robot(scene: Parts, what: str, name: str) -> Robot:

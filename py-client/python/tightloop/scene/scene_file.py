@@ -50,6 +50,7 @@ def written(
                 {name: value for name, value in _without_none(scan).items() if name != "first"}
                 for scan in scene.height_scans.values()
             ],
+            "camera": [camera.table() for camera in scene.cameras.values()],
         }
     )
 
@@ -127,7 +128,7 @@ def to_mujoco(scene: Parts, toml: str, varying: Set[str], path: str | os.PathLik
         SceneError: The file cannot be written.
     """
     text = mjcf.written(json.loads(_core.compiled_scene(toml)), "scene")
-    left = [*scene.contact_sensors, *scene.height_scans]
+    left = [*scene.contact_sensors, *scene.height_scans, *scene.cameras]
     if left:
         advice.warn(f"to_mujoco: MJCF has no equal of sensor {', '.join(map(repr, left))}; it is left out")
     drawn = sorted(varying & set(_core.param_names()))
@@ -171,6 +172,8 @@ def calls(tables: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, dict[s
         yield "add_contact_sensor", sensor
     for scan in tables.get("height_scan", ()):
         yield "add_height_scan", _scan_arguments(scan)
+    for camera in tables.get("camera", ()):
+        yield "add_camera", camera
     yield "randomize", randomization.from_tables(tables.get("randomize", {}))
 
 

@@ -112,7 +112,7 @@ def launch(
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
         threads: Largest number of threads of a step, shared by all groups; all cores if left out.
         fields: Frame fields besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
-            attributes.
+            attributes, and of images of cameras, such as ``"wrist_depth"`` (`Scene.add_camera`).
         params: Model parameters that vary between worlds and can be written at run time, such as ``"shape_mu"``,
             ``"joint_friction"``, ``"command_delay"``, ``"gyro_noise"``; `Sim.params` lists them all. Parameters that
             the scene names and those that `Scene.randomize` draws vary too.
@@ -165,7 +165,7 @@ def launch(
         "worlds": checks.integer("launch: worlds", worlds, error=ArgumentError),
         "device": checks.text("launch: device", device, error=ArgumentError),
         "precision": checks.text("launch: precision", precision, error=ArgumentError),
-        "fields": _joined("fields", fields, "field", _core.field_names()),
+        "fields": _joined("fields", fields, "field", [*_core.field_names(), *_image_fields(scene)]),
         "params": _joined("params", params, "parameter", _core.param_names()),
         "name": f"sim-{os.getpid()}-{secrets.token_hex(4)}"
         if name is None
@@ -202,6 +202,11 @@ def launch(
         daemon.stop()
         raise
     return sims[0] if groups is None else Groups(arguments["name"], sims)
+
+
+def _image_fields(scene: Scene) -> list[str]:
+    """Return the names of the fields of a scene's cameras."""
+    return [name for camera in scene.cameras.values() for name in camera.fields]
 
 
 def _check_names(argument: str, names: Any) -> None:

@@ -76,6 +76,8 @@ class Sim(Attributes):
         equality_names: ``model/equality`` of each equality, in the order of ``eq_active``.
         keyframe_names: ``model/keyframe`` of each keyframe.
         sensor_names: ``model/sensor`` of each sensor of MuJoCo models, in MuJoCo's order.
+        segment_names: What the labels of segmentation images stand for: bodies as in ``body_names``, then parts of the
+            world. Empty without images.
         sensors: Columns of each sensor in ``sensordata``, by its name, and by ``sensor`` alone where one model has it.
         dofs: Slice of each robot's dofs, by robot name.
         coords: Slice of each robot's coordinates.
@@ -115,6 +117,7 @@ class Sim(Attributes):
         self.equality_names: list[str] = self.info["equality_names"]
         self.keyframe_names: list[str] = [known["name"] for known in self.info["keyframes"]]
         self.sensor_names: list[str] = self.info["sensor_names"]
+        self.segment_names: list[str] = self.info["segment_names"]
         self.sensors: dict[str, slice] = slices_by_name(self.sensor_names, self.info["sensors"])
         self.dofs, self.coords, self.bodies = (
             ByName("robot", {robot["name"]: slice(*robot[range_]) for robot in self.info["robots"]})

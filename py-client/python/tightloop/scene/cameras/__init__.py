@@ -1,0 +1,1 @@
+"""Cameras: their properties, and the checks of those that are added."""

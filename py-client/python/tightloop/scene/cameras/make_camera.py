@@ -1,0 +1,122 @@
+"""Making cameras of a scene, checked against what the scene has."""
+
+from __future__ import annotations
+
+import math
+from typing import get_args
+
+from tightloop.checks import arguments as checks
+from tightloop.checks.arguments import Vector
+from tightloop.errors import SceneError
+from tightloop.scene.body import Body
+from tightloop.scene.cameras.camera import Camera, Sees
+from tightloop.scene.cameras.look_at import towards
+from tightloop.scene.cameras.of_mujoco import of_mujoco
+from tightloop.scene.parts import Parts, bearer_name, free_name
+from tightloop.scene.robot import Link
+from tightloop.scene.shapes import ORIGIN
+
+#: Vertical field of view where none is given: 45°, as in MuJoCo [rad].
+FOV = math.pi / 4
+#: Most pixels along an axis.
+PIXELS_MAX = 4096
+#: Longest name [bytes].
+NAME_MAX = 19
+
+
+def add_camera(
+    scene: Parts,
+    *,
+    name: str | None,
+    mujoco: str | None,
+    body: Body | Link | str | None,
+    pos: Vector,
+    quat: Vector | None,
+    target: Vector | None,
+    width: int | None,
+    height: int | None,
+    fov: float | None,
+    focal: Vector | None,
+    center: Vector | None,
+    near: float,
+    far: float,
+    every: int,
+    sees: Sees,
+    depth_noise: Vector,
+) -> Camera:
+    """Add a camera to a scene; the other arguments are those of `Scene.add_camera`.
+
+    Raises:
+        SceneError: A value is out of range, or the body does not exist.
+    """
+    taken = scene.cameras
+    name = checks.name("camera", free_name("camera", taken) if name is None else name, [*taken])
+    if not (name.isascii() and name.isidentifier() and len(name) <= NAME_MAX):
+        raise SceneError(
+            f"camera name is {name!r:.80}; fields are named after it: give letters, digits and _, {NAME_MAX} at most"
+        )
+    what = f"camera `{name}`"
+    if mujoco is not None:
+        if (body, quat, target, fov, focal, center) != (None,) * 6 or tuple(pos) != ORIGIN:
+            raise SceneError(
+                f"{what}: mujoco gives place and lens; give no body, pos, quat, target, fov, focal or center"
+            )
+        like = of_mujoco(scene, what, mujoco, width, height)
+        body, pos, quat, width, height = like.body, like.pos, like.quat, like.width, like.height
+        fov, focal, center = like.fov, like.focal, like.center
+    if width is None or height is None:
+        raise SceneError(f"{what}: give width and height, the pixels of its image")
+    pixels = [checks.integer(f"{what}: {side}", count) for side, count in (("width", width), ("height", height))]
+    if max(pixels) > PIXELS_MAX:
+        raise SceneError(f"{what}: it has {pixels[0]} × {pixels[1]} pixels; give at most {PIXELS_MAX} along each axis")
+    place = checks.triple(f"{what}: pos", pos)
+    if quat is not None and target is not None:
+        raise SceneError(f"{what}: both quat and target are given; give one of them")
+    if target is not None:
+        point = checks.triple(f"{what}: target", target)
+        if point == place:
+            raise SceneError(f"{what}: target is where the camera is; give another point")
+        turned = towards(place, point)
+    else:
+        turned = checks.quaternion(f"{what}: quat", (0.0, 0.0, 0.0, 1.0) if quat is None else quat)
+    checks.choice(f"{what}: sees", sees, get_args(Sees))
+    noise = checks.pair(f"{what}: depth_noise", depth_noise)
+    if min(noise) < 0.0:
+        raise SceneError(f"{what}: depth_noise is {noise}; give no negative numbers")
+    nearest = checks.number(f"{what}: near", near, above=0.0)
+    added = taken[name] = Camera(
+        name=name,
+        body=None if body is None else bearer_name(scene, what, body),
+        pos=place,
+        quat=turned,
+        width=pixels[0],
+        height=pixels[1],
+        **_lens(what, fov, focal, center, pixels),
+        near=nearest,
+        far=checks.number(f"{what}: far", far, above=nearest),
+        every=checks.integer(f"{what}: every", every),
+        sees=sees,
+        depth_noise=noise,
+    )
+    return added
+
+
+def _lens(
+    what: str, fov: float | None, focal: Vector | None, center: Vector | None, pixels: list[int]
+) -> dict[str, tuple[float, float]]:
+    """Return focal lengths and the principal point."""
+    middle = (0.5 * pixels[0], 0.5 * pixels[1])
+    if focal is None:
+        if center is not None:
+            raise SceneError(f"{what}: center is given without focal; give both")
+        angle = FOV if fov is None else checks.number(f"{what}: fov", fov, above=0.0)
+        if not 1e-3 <= angle <= 3.1:
+            raise SceneError(f"{what}: fov is {angle!r}; give 0.001 to 3.1 rad")
+        length = middle[1] / math.tan(0.5 * angle)
+        return {"focal": (length, length), "center": middle}
+    if fov is not None:
+        raise SceneError(f"{what}: both fov and focal are given; give one of them")
+    lengths = checks.pair(f"{what}: focal", focal)
+    for length in lengths:
+        checks.number(f"{what}: focal", length, above=0.0)
+    return {"focal": lengths, "center": middle if center is None else checks.pair(f"{what}: center", center)}

@@ -1,0 +1,66 @@
+"""Cameras of MuJoCo models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tightloop.checks.arguments import Quaternion, Triple
+from tightloop.errors import SceneError
+from tightloop.scene.parts import Parts
+
+
+@dataclass(frozen=True)
+class MujocoCamera:
+    """Arguments of `Scene.add_camera` that a camera of a MuJoCo model stands for."""
+
+    body: str
+    pos: Triple
+    quat: Quaternion
+    width: int | None
+    height: int | None
+    fov: float | None
+    focal: tuple[float, float] | None
+    center: tuple[float, float] | None
+
+
+def of_mujoco(scene: Parts, what: str, name: str, width: int | None, height: int | None) -> MujocoCamera:
+    """Return a camera of a model, ``model/camera``, for an image of a size, or of its own.
+
+    Raises:
+        SceneError: There is no such camera, or it follows a body.
+    """
+    model, _, camera = name.partition("/") if isinstance(name, str) else ("", "", "")
+    if model not in scene.models:
+        known = ", ".join(f"{model}/{camera}" for model in scene.models for camera in scene.models[model].cameras)
+        raise SceneError(
+            f"{what}: mujoco is {name!r}; give 'model/camera'; cameras of the scene's models: {known or '–'}"
+        )
+    cameras = scene.models[model].cameras
+    if camera not in cameras:
+        raise SceneError(f"{what}: model `{model}` has no camera {camera!r}; it has {', '.join(cameras) or 'none'}")
+    found = cameras[camera]
+    if not found["is_fixed"]:
+        raise SceneError(
+            f"{what}: `{name}` tracks or targets a body; cameras here are fixed to theirs: give body, pos and target"
+        )
+    own = found["resolution"]
+    has_own = max(own) > 1
+    if has_own:
+        width, height = own[0] if width is None else width, own[1] if height is None else height
+    focal, center = found["focal"], found["center"]
+    if focal is not None and width is not None and height is not None:
+        scale = (width / own[0], height / own[1])
+        focal = (focal[0] * scale[0], focal[1] * scale[1])
+        center = (center[0] * scale[0], center[1] * scale[1])
+    x, y, z = found["pos"]
+    qx, qy, qz, qw = found["quat"]
+    return MujocoCamera(
+        body=f"{model}/{found['link']}",
+        pos=(x, y, z),
+        quat=(qx, qy, qz, qw),
+        width=width,
+        height=height,
+        fov=found["fov"],
+        focal=focal,
+        center=center,
+    )
