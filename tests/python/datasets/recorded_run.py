@@ -76,8 +76,8 @@ def copied(frame: tl.Frame) -> dict[str, NDArray[Any]]:
 
 
 def with_images(run: Run) -> tuple[Layout, list[Episode]]:
-    """The episodes of a run with images of a camera, as no renderer makes them yet."""
-    fields = ("rgb/wrist", "depth/wrist", "segmentation/wrist")
+    """The episodes of a run with images of a camera that the recording does not have."""
+    fields = ("wrist_rgb", "wrist_depth", "wrist_segmentation")
     chosen = layout(run.path, fields=("joint_q",), action=None, joints=None, worlds=None, fps=None)
     chosen = dataclasses.replace(
         chosen, fields=("joint_q", *fields), columns={**chosen.columns, **dict.fromkeys(fields, ())}
@@ -100,7 +100,7 @@ def with_images(run: Run) -> tuple[Layout, list[Episode]]:
 def made_images(count: int, seed: int) -> dict[str, NDArray[Any]]:
     rng = np.random.default_rng(seed)
     return {
-        "rgb/wrist": rng.integers(0, 256, (count, *SHAPE, 3), np.uint8),
-        "depth/wrist": rng.uniform(0, 5, (count, *SHAPE)).astype(np.float32),
-        "segmentation/wrist": rng.integers(-1, 40, (count, *SHAPE), np.int32),
+        "wrist_rgb": rng.integers(0, 256, (count, *SHAPE, 3), np.uint8),
+        "wrist_depth": rng.uniform(0, 5, (count, *SHAPE)).astype(np.float32),
+        "wrist_segmentation": rng.integers(-1, 40, (count, *SHAPE), np.int32),
     }

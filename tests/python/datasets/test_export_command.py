@@ -60,7 +60,7 @@ def test_wrong_usage_ends_with_2(run, tmp_path):
     [
         ({"to": "hdf"}, tl.ArgumentError, r"to is 'hdf'; did you mean .*hdf5"),
         ({"fields": ["joint_qq"]}, tl.UnknownField, r"fields has 'joint_qq'; did you mean .*joint_q"),
-        ({"fields": ["rgb/wrist"]}, tl.UnknownField, r"no field `rgb/wrist`"),
+        ({"fields": ["wrist_rgb"]}, tl.UnknownField, r"fields has 'wrist_rgb'; there are"),
         ({"fields": []}, tl.ArgumentError, r"fields is empty; give at least one name"),
         ({"fields": "joint_q"}, tl.ArgumentError, r"fields is 'joint_q'; give a list of names"),
         ({"worlds": [1, 3]}, tl.ArgumentError, r"worlds has 3, and there are 3 in the recording, from 0 on"),

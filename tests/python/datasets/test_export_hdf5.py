@@ -51,9 +51,9 @@ def test_images_are_named_and_shaped_as_robomimic_expects_them(run, tmp_path):
         for each in made:
             obs = file[f"data/demo_{each.index}/obs"]
             assert set(obs) == {"joint_q", "wrist_image", "wrist_depth", "wrist_segmentation"}
-            np.testing.assert_array_equal(obs["wrist_image"], each.observations["rgb/wrist"])
-            np.testing.assert_array_equal(obs["wrist_depth"][..., 0], each.observations["depth/wrist"])
-            np.testing.assert_array_equal(obs["wrist_segmentation"][..., 0], each.observations["segmentation/wrist"])
+            np.testing.assert_array_equal(obs["wrist_image"], each.observations["wrist_rgb"])
+            np.testing.assert_array_equal(obs["wrist_depth"][..., 0], each.observations["wrist_depth"])
+            np.testing.assert_array_equal(obs["wrist_segmentation"][..., 0], each.observations["wrist_segmentation"])
             assert obs["wrist_image"].dtype == np.uint8 and obs["wrist_depth"].shape == (each.steps, 4, 6, 1)
 
 
@@ -82,7 +82,7 @@ def test_a_commit_shows_all_episodes_so_far_while_the_file_is_written_on(run, tm
         with opened(part) as file:
             assert len(file["data"]) == count
             last = file[f"data/demo_{each.index}/obs/wrist_image"][:]
-        np.testing.assert_array_equal(last, each.observations["rgb/wrist"])
+        np.testing.assert_array_equal(last, each.observations["wrist_rgb"])
     writer.close()
     assert [path.name for path in tmp_path.iterdir()] == [out.name]
     with opened(out) as file:

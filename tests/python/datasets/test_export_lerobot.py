@@ -105,13 +105,13 @@ def test_statistics_are_those_of_all_steps(dataset):
 def test_statistics_of_images_are_per_channel():
     images = recorded_run.made_images(6, 1)
     stats = stats_of_episode(
-        {"observation.images.wrist": images["rgb/wrist"], "observation.depth.wrist": images["depth/wrist"]}
+        {"observation.images.wrist": images["wrist_rgb"], "observation.depth.wrist": images["wrist_depth"]}
     )
     colours = stats["observation.images.wrist"]
-    np.testing.assert_allclose(colours["mean"][:, 0, 0], images["rgb/wrist"].mean((0, 1, 2)) / 255, rtol=1e-6)
+    np.testing.assert_allclose(colours["mean"][:, 0, 0], images["wrist_rgb"].mean((0, 1, 2)) / 255, rtol=1e-6)
     assert colours["std"].shape == (3, 1, 1) and list(colours["count"]) == [6]
     depths = stats["observation.depth.wrist"]
-    assert depths["max"].shape == (1, 1) and depths["max"][0, 0] == images["depth/wrist"].max()
+    assert depths["max"].shape == (1, 1) and depths["max"][0, 0] == images["wrist_depth"].max()
     assert set(QUANTILES) < set(depths)
     assert merge(stats, stats)["observation.images.wrist"]["count"] == [12]
 
@@ -121,8 +121,8 @@ def test_images_are_png_files_of_the_same_colours(run, with_images):
     assert len(files) == 3
     steps = [row for file in files for row in parquet.read_table(file).to_pylist()]
     _, made = recorded_run.with_images(run)
-    images = np.concatenate([each.observations["rgb/wrist"] for each in made])
-    depths = np.concatenate([each.observations["depth/wrist"] for each in made])
+    images = np.concatenate([each.observations["wrist_rgb"] for each in made])
+    depths = np.concatenate([each.observations["wrist_depth"] for each in made])
     for row, image, depth in zip(steps, images, depths, strict=True):
         with Image.open(io.BytesIO(row["observation.images.wrist"]["bytes"])) as read:
             np.testing.assert_array_equal(np.asarray(read), image)
@@ -158,9 +158,9 @@ def test_lerobots_own_library_reads_images_and_windows_of_steps(run, with_images
         for step in range(each.steps):
             item = read[next(places)]
             pixels = item["observation.images.wrist"][0].numpy().transpose(1, 2, 0) * 255
-            np.testing.assert_allclose(pixels, each.observations["rgb/wrist"][step], atol=1e-3)
+            np.testing.assert_allclose(pixels, each.observations["wrist_rgb"][step], atol=1e-3)
             np.testing.assert_array_equal(
-                item["observation.depth.wrist"].numpy(), each.observations["depth/wrist"][step]
+                item["observation.depth.wrist"].numpy(), each.observations["wrist_depth"][step]
             )
             following = min(step + 1, each.steps - 1)
             np.testing.assert_array_equal(item["action"][1].numpy(), each.actions[following])

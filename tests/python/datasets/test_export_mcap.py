@@ -95,7 +95,7 @@ def test_images_are_foxgloves(run, tmp_path):
     for kind, encoding, dtype in (("rgb", "rgb8", "u1"), ("depth", "32FC1", "<f4"), ("segmentation", "32FC1", "<f4")):
         assert schemas[f"/world_0/{kind}/wrist"] == "foxglove.RawImage"
         images = [message for _, message in messages[f"/world_0/{kind}/wrist"]]
-        before = [image for each in made if each.world == 0 for image in each.observations[f"{kind}/wrist"]]
+        before = [image for each in made if each.world == 0 for image in each.observations[f"wrist_{kind}"]]
         # without those behind last steps
         ends = np.cumsum(np.array(LENGTHS) + 1) - 1
         images = [image for place, image in enumerate(images) if place not in ends]

@@ -68,7 +68,7 @@ def test_images_are_images_of_their_kind(run, tmp_path):
         ("segmentation", "SegmentationImage", "<i4"),
     ):
         buffers = columns[f"world_0/{kind}/wrist"][f"{archetype}:buffer"]
-        field = f"{kind}/wrist"
+        field = f"wrist_{kind}"
         expected = [
             image
             for each in made
