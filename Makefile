@@ -4,6 +4,7 @@
 SHELL  := /bin/bash
 VENV   := .venv
 MJLAB  := .venv-mjlab
+LEROBOT := .venv-lerobot
 PYTHON := $(VENV)/bin/python
 PIP    := $(PYTHON) -m pip --disable-pip-version-check
 PYTEST := $(PYTHON) -m pytest -c py-client/pyproject.toml --rootdir .
@@ -41,10 +42,10 @@ EMULATOR := qemu-user gcc-aarch64-linux-gnu
 # Windows without Windows, and a linker for it.
 WINE := wine wine64 gcc-mingw-w64-x86-64
 
-.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-ray train kills soak simulate fuzz fuzz-bytes \
+.PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-lerobot test-ray train kills soak simulate fuzz fuzz-bytes \
   failpoints miri asan tsan loom nightly nightly-processes nightly-inputs nightly-memory published menagerie mujoco-versions packages coverage \
   newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
-  $(addprefix announce-,demo test test-all docs test-rl test-mjlab train bench-env coverage)
+  $(addprefix announce-,demo test test-all docs test-rl test-mjlab test-lerobot train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
 # The tour comes first because it draws within seconds. The wheel is all that is compiled: a program beside it would
@@ -107,6 +108,10 @@ test-rl: announce-test-rl wheel $(VENV)/.dev $(VENV)/.rl ## adapters of RL libra
 # Not part of `test-rl`: mjlab needs another rsl_rl and another MuJoCo than .venv.
 test-mjlab: announce-test-mjlab wheel $(MJLAB)/.wheel ## tasks of mjlab beside MuJoCo-Warp, four minutes (installs 6 GB)
 	OMP_NUM_THREADS=1 $(MJLAB)/bin/python -m pytest -c py-client/pyproject.toml --rootdir . tests/mjlab
+
+# Not part of `test`: lerobot needs torch, and another rerun-sdk than .venv.
+test-lerobot: announce-test-lerobot wheel $(LEROBOT)/.wheel ## datasets read back by LeRobot's own library (installs 3 GB)
+	$(LEROBOT)/bin/python -m pytest -c py-client/pyproject.toml --rootdir . tests/python/datasets/test_export_lerobot.py
 
 # Not part of `test`, which compares 25 worlds.
 test-ray: wheel $(VENV)/.dev ## a Ray cluster of three nodes with 3072 worlds, beside one daemon, and a killed node
@@ -309,6 +314,14 @@ $(MJLAB)/.wheel: $(VENV)/.wheel $(MJLAB)/.mjlab
 	$(MJLAB)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
 	@touch $@
 
+$(LEROBOT)/.lerobot: py-client/requirements-lerobot.txt | $(PYTHON)
+	$(PYTHON) -m venv $(LEROBOT)
+	$(LEROBOT)/bin/python -m pip --disable-pip-version-check install --quiet -r $<
+	@touch $@
+$(LEROBOT)/.wheel: $(VENV)/.wheel $(LEROBOT)/.lerobot
+	$(LEROBOT)/bin/python -m pip --disable-pip-version-check install --quiet --no-deps --force-reinstall $(VENV)/wheels/*.whl
+	@touch $@
+
 # cargo-llvm-cov goes into .venv; the profile reader belongs to the Rust toolchain.
 LLVM_COV := PATH="$(CURDIR)/$(VENV)/bin:$$PATH" cargo llvm-cov
 llvm-cov: | $(PYTHON)
@@ -329,6 +342,8 @@ announce-test-rl:
 	@.ci/needs test-rl && .ci/announce test-rl "demo dev rl" ""
 announce-test-mjlab:
 	@.ci/needs test-mjlab && .ci/announce test-mjlab "demo" "" && .ci/announce test-mjlab mjlab "" $(MJLAB)
+announce-test-lerobot:
+	@.ci/needs test-lerobot && .ci/announce test-lerobot "demo" "" && .ci/announce test-lerobot lerobot "" $(LEROBOT)
 announce-train:
 	@.ci/needs train && .ci/announce train "demo dev rl" ""
 announce-bench-env:

@@ -130,7 +130,9 @@ def test_images_are_png_files_of_the_same_colours(run, with_images):
 
 
 def test_lerobots_own_library_reads_the_steps(run, dataset):
-    library = pytest.importorskip("lerobot.datasets.lerobot_dataset", reason="lerobot is not installed: it needs torch")
+    library = pytest.importorskip(
+        "lerobot.datasets.lerobot_dataset", reason="lerobot is not installed: `make test-lerobot` does"
+    )
     read = library.LeRobotDataset("tightloop/swing", root=dataset)
     assert (read.num_episodes, read.num_frames, read.fps) == (9, STEPS, 60)
     assert read.meta.stats["action"]["mean"].shape == (2,)
@@ -147,7 +149,9 @@ def test_lerobots_own_library_reads_the_steps(run, dataset):
 
 
 def test_lerobots_own_library_reads_images_and_windows_of_steps(run, with_images):
-    library = pytest.importorskip("lerobot.datasets.lerobot_dataset", reason="lerobot is not installed: it needs torch")
+    library = pytest.importorskip(
+        "lerobot.datasets.lerobot_dataset", reason="lerobot is not installed: `make test-lerobot` does"
+    )
     chosen, made = recorded_run.with_images(run)
     read = library.LeRobotDataset(
         "tightloop/looks", root=with_images, delta_timestamps={"action": [0, 1 / 60], "observation.images.wrist": [0]}
