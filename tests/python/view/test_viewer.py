@@ -19,6 +19,7 @@ import viser
 import tightloop as tl
 from processes import alive, started, wait_until
 from tightloop.view import cameras, dependencies
+from tightloop.view.browser.camera_image import image_fields, picture
 from tightloop.view.browser.display_options import DisplayOptions
 from tightloop.view.browser.drag_spring import drag_spring
 from tightloop.view.browser.frame_stream import FIELDS
@@ -28,7 +29,7 @@ from tightloop.view.browser.player import Player
 from tightloop.view.browser.plots import choices
 from tightloop.view.browser.sliders import Sliders
 from tightloop.view.command import main
-from tightloop.view.meshes import floor, grid
+from tightloop.view.meshes import floor, grid, paint
 from tightloop.view.meshes.batched import batched_meshes
 from tightloop.view.parts import Mesh, Part
 from tightloop.view.poses import IDENTITY
@@ -148,6 +149,32 @@ def test_a_robot_at_its_targets_is_where_its_drives_take_it(lesson):
         ghost = sim.forward_kinematics(at_targets(sim.info, joints(sim.info), sim.reset().joint_q[0], goal))
         # drives without gravity end at their targets, but for dry friction over stiffness: 1e-3 rad
         assert np.allclose(ghost, frame.body_q[0], atol=2e-3)
+
+
+def test_images_of_cameras_are_shown_in_colours():
+    depth = np.array([[0.0, 1.0], [2.0, 4.0]], np.float32)
+    near = picture("eye_depth", depth)
+    assert near.shape == (320, 320, 3) and near.dtype == np.uint8
+    assert near[0, 0].max() == 0 and near[0, -1, 0] > near[-1, 0, 0] > near[-1, -1, 0] > 0
+    labels = picture("eye_segmentation", np.array([[-1, 0, 3]], np.int32))
+    assert labels[0, 0].max() == 0 and tuple(labels[0, -1]) == paint.palette(3)[:3]
+    colours = np.arange(2 * 400 * 3, dtype=np.uint8).reshape(2, 400, 3)
+    assert np.array_equal(picture("eye_rgb", colours), colours)
+    assert np.array_equal(picture("eye_segmentation", np.full((1, 320), -1, np.int32)), np.zeros((1, 320, 3)))
+
+
+def test_a_page_offers_the_images_of_the_scenes_cameras(lesson):
+    scene = lesson(driven=True)
+    camera = scene.add_camera(width=8, height=6, name="eye")
+    with tl.launch(scene, worlds=2) as sim:
+        assert image_fields(sim.info) == list(camera.fields)
+        live = Live(sim.name, fields=(*FIELDS, camera.rgb))
+        try:
+            sim.reset()
+            shown = live.poll(10.0)
+            assert shown is not None and picture(camera.rgb, shown.eye_rgb[1]).shape == (240, 320, 3)
+        finally:
+            live.close()
 
 
 def test_fields_are_plotted_by_the_names_of_their_columns(lesson):

@@ -227,6 +227,20 @@ def test_contacts_ghosts_frames_shapes_and_plots_are_shown_when_they_are_chosen(
         view.shot("plot")
 
 
+def test_the_image_of_a_camera_is_shown_when_it_is_chosen(arm, look, unique):
+    arm.add_camera(pos=(1.0, -0.5, 0.9), target=(0, -0.5, 0.2), width=40, height=30, name="eye")
+    with tl.launch(arm, worlds=1, name=unique()) as sim:
+        sim.reset()
+        view = look(sim.view(port=8300).url)
+        view.close_notices()
+        view.page.get_by_text("Cameras", exact=True).click()
+        for field in ("eye_rgb", "eye_depth"):
+            view.choose("Image", field)
+            view.wait(lambda: view.page.locator("img[src^='blob:']").count() == 1, f"{field} is shown")
+            sim.step()
+        view.shot("camera_image")
+
+
 def test_a_body_is_pulled_with_shift_and_the_mouse(box, look, unique):
     with tl.launch(box, worlds=1, name=unique(), params=("body_f",)) as sim:
         sim.reset()

@@ -1,4 +1,4 @@
-"""The page's controls: time, display, joint targets, drag forces and plots.
+"""The page's controls: time, display, joint targets, drag forces, images of cameras and plots.
 
 They change `DisplayOptions` and send requests to the driver.
 """
@@ -14,6 +14,7 @@ import numpy as np
 import viser
 
 from tightloop.arrays.frames import FAULTED
+from tightloop.view.browser.camera_image import CameraImage, image_fields
 from tightloop.view.browser.display_options import DisplayOptions
 from tightloop.view.browser.frame_stream import FrameStream
 from tightloop.view.browser.joints import Joint
@@ -78,6 +79,10 @@ class Panel:
                 self._sliders = Sliders(self._gui, driven, driver, options, worlds)
             with self._folder("Push", expanded=False):
                 self._add_push(driver)
+        self._image = None
+        if images := image_fields(info):
+            with self._folder("Cameras", expanded=False):
+                self._image = CameraImage(self._gui, images)
         with self._folder("Plots", expanded=False):
             self._add_plots()
         if notes:
@@ -86,8 +91,9 @@ class Panel:
 
     @property
     def fields(self) -> set[str]:
-        """Fields that plots show."""
-        return {plot.field for plot in self._plots}
+        """Fields that plots and the image show."""
+        image = None if self._image is None else self._image.field
+        return {plot.field for plot in self._plots} | ({image} if image else set())
 
     def update(self, shown: Any, *, new: bool) -> None:
         """Update text, sliders and plots.
@@ -117,6 +123,8 @@ class Panel:
             self._sliders.update(np.asarray(shown.joint_target_q)[world], disabled=taken is not None)
         for plot in self._plots:
             plot.draw()
+        if self._image is not None:
+            self._image.show(shown, world)
 
     def hide(self) -> None:
         """Hide the controls; a browser that is slow may still get updates of those that are removed."""
