@@ -7,7 +7,9 @@ use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
-use sim_daemon::observe::{self, Array, Arrays, DaemonError, Dtype, FrameFields, Precision, Shows};
+use sim_daemon::observe::{
+    self, Array, Arrays, DaemonError, Drawn, Draws, Dtype, FrameFields, Precision, Shows,
+};
 
 use crate::errors::raise;
 
@@ -19,6 +21,7 @@ pub(crate) struct Evaluation(Mutex<observe::Evaluation>);
 impl Evaluation {
     /// The first ``worlds`` of a scene as TOML, with paths relative to a folder.
     #[new]
+    #[pyo3(signature = (scene, folder, worlds, precision, fields, *, drawn = (0, "world".to_owned(), false)))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -26,14 +29,21 @@ impl Evaluation {
         worlds: usize,
         precision: &str,
         fields: Vec<String>,
+        drawn: (usize, String, bool),
     ) -> PyResult<Evaluation> {
+        let (first_world, draws, resets) = drawn;
+        let drawn = Drawn {
+            first_world,
+            draws: Draws::named(&draws).unwrap_or_default(),
+            resets,
+        };
         let fields = named(py, &fields, None)?;
         let precision = match precision {
             "f64" => Precision::F64,
             _ => Precision::F32,
         };
-        let made =
-            py.detach(|| observe::Evaluation::new(scene, &folder, worlds, precision, &fields));
+        let made = py
+            .detach(|| observe::Evaluation::new(scene, &folder, worlds, precision, &fields, drawn));
         let made = made.map_err(|error| raised(py, &error))?;
         Ok(Evaluation(Mutex::new(made)))
     }

@@ -13,7 +13,7 @@ pub const DOORS: [(&str, &str); 30] = [
     ("base64", "sim-core/model/src/geometry/load"),
     ("blake3", "sim-core/model/src/cache_files.rs"),
     ("postcard", "sim-core/model/src/geometry/cache.rs"),
-    ("rayon", "sim-core/engine/src/backend/cpu"),
+    ("rayon", "sim-core/engine/src/workers.rs"),
     ("crc32fast", "sim-core/engine/src/snapshot.rs"),
     ("iceoryx2", "sim-daemon/protocol/src"),
     ("iceoryx2", "sim-daemon/simulated/machine/src"),
@@ -127,7 +127,7 @@ pub const STRANGERS: &[(&str, &[&str])] = &[
 ];
 
 /// Where `unsafe` may stand, and why.
-pub const UNSAFE: [&str; 58] = [
+pub const UNSAFE: [&str; 60] = [
     "py-client/src/frame.rs",                                     // NumPy views
     "py-client/src/xla/abi.rs", // structs and arrays of XLA's foreign functions
     "sim-core/compile/src/lib.rs", // runs machine code
@@ -162,6 +162,8 @@ pub const UNSAFE: [&str; 58] = [
     "sim-daemon/client-c/src/frame.rs", // as calls.rs
     "sim-daemon/client-c/src/timing.rs", // as calls.rs
     "sim-daemon/client-c/src/pointers.rs", // what C passes: texts, arrays, places of results
+    "sim-daemon/src/eyes/memory.rs",    // images of a frame, written by several threads
+    "sim-daemon/src/eyes/part.rs",      // as memory.rs
     "sim-daemon/protocol/src/memory/frame.rs", // views of a sample
     "sim-daemon/protocol/src/waiting/park.rs", // the descriptor of a listener
     "sim-daemon/protocol/src/memory/loaned.rs", // loaned samples

@@ -299,13 +299,23 @@ class Evaluation:
         worlds: Number of worlds: the first ones of each state.
         precision: Precision of the run.
         fields: Fields to evaluate, besides those of every frame.
+        drawn: What draws depend on: number of the first world, ``draws`` of the launch, and whether faults reset worlds.
 
     Raises:
         SceneError: The scene is not valid, or its files cannot be read.
         UnknownField: There is no such field.
     """
 
-    def __init__(self, scene: str, folder: str, worlds: int, precision: str, fields: Sequence[str]) -> None: ...
+    def __init__(
+        self,
+        scene: str,
+        folder: str,
+        worlds: int,
+        precision: str,
+        fields: Sequence[str],
+        *,
+        drawn: tuple[int, str, bool] = (0, "world", False),
+    ) -> None: ...
     @property
     def model_hash(self) -> int: ...
     def evaluate(self, state: NDArray[np.uint8], /) -> dict[str, NDArray[Any]]:

@@ -1,5 +1,6 @@
 //! What cameras see: the shapes of a scene, and where they are in a world.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use sim_model::Pose;
@@ -185,6 +186,8 @@ struct Joined {
     triangles: Vec<[Point; 3]>,
     labels: Vec<i32>,
     tones: Vec<Color>,
+    /// Where they are in that list, by their bits.
+    places: HashMap<[u32; 3], usize>,
     /// Of each triangle, its tone.
     chosen: Vec<u32>,
 }
@@ -192,11 +195,13 @@ struct Joined {
 impl Joined {
     fn add(&mut self, mesh: &TriMesh, part: &Part) {
         let tone = part.paint.toned(1.0);
-        let same = |other: &Color| other.map(f32::to_bits) == tone.map(f32::to_bits);
-        let place = self.tones.iter().position(same).unwrap_or_else(|| {
-            self.tones.push(tone);
-            self.tones.len() - 1
-        });
+        let place = *self
+            .places
+            .entry(tone.map(f32::to_bits))
+            .or_insert_with(|| {
+                self.tones.push(tone);
+                self.tones.len() - 1
+            });
         let corners = mesh
             .triangles
             .iter()

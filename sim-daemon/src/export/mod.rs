@@ -226,7 +226,7 @@ pub(crate) fn description(
         scene: info.scene_text,
         scene_folder: info.scene_folder,
         model_hash: model.hash(),
-        notes: notes(info.scene),
+        notes: [notes(info.scene), info.images.notes().to_vec()].concat(),
         warnings: Vec::new(),
         driven: driven(model, info.scene),
         angle_range: angle_range(info.scene),

@@ -10,10 +10,21 @@ const PARTS: u32 = 8;
 const FOCAL: [f64; 2] = [0.1, 10.0];
 
 /// What draws depend on.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Moment {
     pub(super) episode: Episode,
     pub(super) step: u64,
+}
+
+impl Moment {
+    /// Whether its frame repeats an image that was drawn then, with so many frames from one image to the next.
+    pub(super) fn repeats(&self, then: &Moment, every: u64) -> bool {
+        let is_later = then.step < self.step || *then == *self;
+        then.episode == self.episode
+            && is_later
+            && !self.step.is_multiple_of(every)
+            && then.step / every == self.step / every
+    }
 }
 
 /// The random part of a camera.
@@ -73,7 +84,7 @@ impl Chance {
         (place.then(&Frame::from(&offset_pose)), camera)
     }
 
-    /// Adds noise to the depths of what is seen.
+    /// Adds noise to the depths of what is seen, which stay between the nearest and the farthest one.
     pub(super) fn add_noise(
         &self,
         moment: &Moment,

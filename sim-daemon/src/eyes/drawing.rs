@@ -3,11 +3,12 @@
 use sim_engine::backend::BackendError;
 use sim_engine::random::Episode;
 use sim_engine::simulation::Simulation;
-use sim_engine::workers::{PARTS_PER_THREAD, Workers};
+use sim_engine::workers::Workers;
 
-use super::images::Images;
+use super::images::{Images, parts};
 use super::memory::{Memory, State};
 use super::part::Part;
+use super::sight::Eye;
 use crate::error::DaemonError;
 
 /// The cameras of a group of worlds.
@@ -16,8 +17,10 @@ pub(crate) struct Eyes {
     /// None without images.
     parts: Vec<Part>,
     workers: Option<Workers>,
-    /// Of each world, where a camera is random.
+    /// Of each world, where a camera is random or repeats images.
     episodes: Vec<Episode>,
+    /// Whether worlds are reset after a fault.
+    resets: bool,
 }
 
 impl Eyes {
@@ -28,10 +31,12 @@ impl Eyes {
             parts: Vec::new(),
             workers: None,
             episodes: Vec::new(),
+            resets: false,
         }
     }
 
-    /// The cameras of groups of worlds, each with these images, which share threads.
+    /// The cameras of groups of worlds, each with these images, which share threads. `resets` where worlds are reset after a
+    /// fault.
     ///
     /// # Errors
     /// Threads that the system does not start.
@@ -39,13 +44,17 @@ impl Eyes {
         images: &Images,
         threads: usize,
         groups: usize,
+        resets: bool,
     ) -> Result<Vec<Eyes>, DaemonError> {
+        let worlds = images.seen.as_ref().map_or(1, |seen| seen.steps.shape[0]);
+        // one world is drawn by one thread
+        let threads = threads.min(worlds.saturating_mul(groups));
         let workers = images.seen.as_ref().map(|_| {
             let failed = |reason| BackendError::Threads { threads, reason };
             Workers::new(threads, groups).map_err(failed)
         });
         let workers = workers.transpose()?;
-        let eyes = (0..groups).map(|_| Eyes::new(images.clone(), threads, workers.clone()));
+        let eyes = (0..groups).map(|_| Eyes::new(images.clone(), threads, workers.clone(), resets));
         Ok(eyes.collect())
     }
 
@@ -53,32 +62,35 @@ impl Eyes {
     ///
     /// # Errors
     /// As [`Eyes::of_groups`].
-    pub(crate) fn alone(images: &Images, simulation: &Simulation) -> Result<Eyes, DaemonError> {
-        let mut eyes = Eyes::of_groups(images, simulation.threads(), 1)?;
+    pub(crate) fn alone(
+        images: &Images,
+        simulation: &Simulation,
+        resets: bool,
+    ) -> Result<Eyes, DaemonError> {
+        let mut eyes = Eyes::of_groups(images, simulation.threads(), 1, resets)?;
         Ok(eyes.remove(0))
     }
 
-    fn new(images: Images, threads: usize, workers: Option<Workers>) -> Eyes {
+    fn new(images: Images, threads: usize, workers: Option<Workers>, resets: bool) -> Eyes {
         let mut eyes = Eyes {
             images,
             parts: Vec::new(),
             workers,
             episodes: Vec::new(),
+            resets,
         };
         let Some(seen) = &eyes.images.seen else {
             return eyes;
         };
         let worlds = seen.steps.shape[0];
-        let count = match threads {
-            1 => 1,
-            _ => (threads * PARTS_PER_THREAD).min(worlds),
-        };
+        let count = parts(threads, worlds);
         let parts = (0..count).map(|part| {
             let worlds = part * worlds / count..(part + 1) * worlds / count;
             Part::new(&seen.sight, eyes.images.fields(), worlds)
         });
         eyes.parts = parts.collect();
-        if seen.sight.eyes.iter().any(|eye| eye.chance.is_random()) {
+        let depends = |eye: &Eye| eye.chance.is_random() || eye.every > 1;
+        if seen.sight.eyes.iter().any(depends) {
             eyes.episodes = vec![Episode::default(); worlds];
         }
         eyes
@@ -89,11 +101,17 @@ impl Eyes {
         &self.images
     }
 
-    /// Draws the images of a frame, which has the arrays of this simulation already. Without cameras it does nothing.
+    /// Lets all cameras draw in the next frame: nothing that it shows then depends on what came before.
+    pub(crate) fn forget(&mut self) {
+        self.parts.iter_mut().for_each(Part::forget);
+    }
+
+    /// Draws the images of a frame, which has the arrays of this simulation already. Later frames repeat them if it `keeps`
+    /// them. Without cameras it does nothing.
     ///
     /// # Panics
     /// The arena is smaller than [`Images::arena_bytes`].
-    pub(crate) fn draw(&mut self, simulation: &Simulation, arena: &mut [u64]) {
+    pub(crate) fn draw(&mut self, simulation: &Simulation, arena: &mut [u64], keeps: bool) {
         let (Some(seen), Some(workers)) = (&self.images.seen, &self.workers) else {
             return;
         };
@@ -107,10 +125,11 @@ impl Eyes {
             bodies: &seen.bodies,
             steps: &seen.steps,
             episodes: &self.episodes,
+            faults: self.resets.then_some(&seen.statuses),
         };
         let fields = self.images.fields();
         workers.for_each(&mut self.parts, |part| {
-            part.draw(&seen.sight, fields, &state, images);
+            part.draw(&seen.sight, fields, &state, images, keeps);
         });
     }
 }

@@ -5,6 +5,7 @@ use sim_physics::arrays::Field;
 use sim_protocol::{Dtype, FieldInfo};
 
 use crate::config::CameraTable;
+use crate::error::DaemonError;
 
 /// What an image tells of each pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +82,14 @@ impl ImageField {
         }
     }
 
+    /// Bytes in all worlds, if memory can have so many.
+    pub(super) fn checked_bytes(&self) -> Option<usize> {
+        let entry = self.dtype.size();
+        self.shape
+            .iter()
+            .try_fold(entry, |all, &n| all.checked_mul(n))
+    }
+
     pub(super) fn bytes(&self) -> usize {
         self.shape.iter().product::<usize>() * self.dtype.size()
     }
@@ -143,6 +152,24 @@ impl FrameFields {
             asked.fields.push(Field::BodyQ);
         }
         Ok(asked)
+    }
+}
+
+impl FrameFields {
+    /// The fields that an argument of the command line names.
+    ///
+    /// # Errors
+    /// A name that no field has, with those that there are.
+    pub(crate) fn of_argument(names: &[String]) -> Result<FrameFields, DaemonError> {
+        let names = names.iter().map(|name| name.trim());
+        FrameFields::named(names.filter(|name| !name.is_empty())).map_err(|name| {
+            let known: Vec<_> = Field::ALL.iter().map(|field| field.row().name).collect();
+            DaemonError::Argument {
+                argument: "fields",
+                value: name.to_owned(),
+                problem: format!("unknown field; known are {}", known.join(", ")),
+            }
+        })
     }
 }
 

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use sim_engine::workers::PARTS_PER_THREAD;
 use sim_physics::arrays::{Field, Layout, Slot};
 use sim_protocol::{ALIGNMENT, ROWS_MAX};
 
-use super::fields::ImageField;
+use super::fields::{ImageField, Plane};
 use super::sight::Sight;
 use crate::error::DaemonError;
 
@@ -27,6 +28,8 @@ pub(super) struct Seen {
     pub(super) bodies: Slot,
     /// Control frames since each world's reset.
     pub(super) steps: Slot,
+    /// Statuses of worlds.
+    pub(super) statuses: Slot,
 }
 
 impl Images {
@@ -66,13 +69,27 @@ impl Images {
             let mut field = field.clone();
             field.shape[0] = steps.shape[0];
             field.offset = images.arena_bytes;
-            images.arena_bytes = (field.offset + field.bytes()).next_multiple_of(ALIGNMENT);
+            images.arena_bytes = field
+                .checked_bytes()
+                .and_then(|bytes| {
+                    field
+                        .offset
+                        .checked_add(bytes)?
+                        .checked_next_multiple_of(ALIGNMENT)
+                })
+                .ok_or_else(|| DaemonError::Argument {
+                    argument: "fields",
+                    value: field.name.clone(),
+                    problem: "images of all worlds exceed every memory; ask for fewer worlds"
+                        .to_owned(),
+                })?;
             images.fields.push(field);
         }
         images.seen = Some(Seen {
             sight: Arc::new(sight),
             words: layout.bytes / size_of::<u64>(),
             bodies: slot(Field::BodyQ),
+            statuses: slot(Field::Status),
             steps,
         });
         Ok(images)
@@ -94,8 +111,15 @@ impl Images {
         self.arena_bytes
     }
 
-    /// Memory that drawing takes besides: the last images of cameras that do not draw in each frame [bytes].
-    pub(crate) fn memory_bytes(&self) -> u64 {
+    /// What cannot be seen, a sentence each.
+    pub(crate) fn notes(&self) -> &[String] {
+        let seen = self.seen.as_ref();
+        seen.map_or(&[], |seen| &seen.sight.notes)
+    }
+
+    /// Memory that drawing takes besides on so many threads: the last images of cameras that do not draw in each frame, and
+    /// depths of those without a field of them [bytes].
+    pub(crate) fn memory_bytes(&self, threads: usize) -> u64 {
         let Some(seen) = &self.seen else { return 0 };
         let repeats = seen.sight.eyes.iter().filter(|eye| eye.every > 1);
         let of_camera = |number| {
@@ -104,6 +128,27 @@ impl Images {
                 .filter(move |field| field.camera == number)
         };
         let images = repeats.flat_map(|eye| of_camera(eye.number));
-        images.map(|field| field.bytes() as u64).sum()
+        let kept: u64 = images.map(|field| field.bytes() as u64).sum();
+        let spare = spare_pixels(&seen.sight, &self.fields) * size_of::<f32>();
+        kept.saturating_add((spare * parts(threads, seen.steps.shape[0])) as u64)
     }
+}
+
+/// How many parts of worlds threads draw.
+pub(super) fn parts(threads: usize, worlds: usize) -> usize {
+    match threads {
+        1 => 1,
+        _ => threads.saturating_mul(PARTS_PER_THREAD).min(worlds),
+    }
+}
+
+/// Pixels of the largest image without a field of depths.
+pub(super) fn spare_pixels(sight: &Sight, fields: &[ImageField]) -> usize {
+    let has_depth = |number| {
+        let mut fields = fields.iter();
+        fields.any(|field| field.camera == number && field.plane == Plane::Depth)
+    };
+    let without = sight.eyes.iter().filter(|eye| !has_depth(eye.number));
+    let pixels = without.map(|eye| eye.camera.width * eye.camera.height);
+    pixels.max().unwrap_or(0)
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 use sim_engine::random::Episode;
-use sim_physics::arrays::{Dtype, Slot};
+use sim_physics::arrays::{Dtype, Slot, status};
 use sim_render::Frame;
 
 use super::chance::Moment;
@@ -17,6 +17,8 @@ pub(super) struct State<'a> {
     pub(super) bodies: &'a Slot,
     pub(super) steps: &'a Slot,
     pub(super) episodes: &'a [Episode],
+    /// Statuses of worlds, where these are reset after a fault.
+    pub(super) faults: Option<&'a Slot>,
 }
 
 impl State<'_> {
@@ -30,10 +32,16 @@ impl State<'_> {
         self.row::<u64>(self.steps, world)[0]
     }
 
-    /// What a world's draws depend on, where a camera is random.
+    /// What a world's draws depend on.
     pub(super) fn moment(&self, world: usize) -> Moment {
+        let mut episode = self.episodes.get(world).copied().unwrap_or_default();
+        let bits = |slot| self.row::<u32>(slot, world)[0];
+        if self.faults.map_or(0, bits) & status::FROZEN != 0 {
+            // the frame that shows a fault is the last one of its episode, after which the next one was counted
+            episode.episode = episode.episode.wrapping_sub(1);
+        }
         Moment {
-            episode: self.episodes.get(world).copied().unwrap_or_default(),
+            episode,
             step: self.steps(world),
         }
     }

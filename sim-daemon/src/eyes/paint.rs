@@ -24,15 +24,15 @@ pub(super) fn of_part(part: &SeenPart, body: Option<usize>) -> Paint {
 
 /// The paint of each triangle of a mesh file, in a part's colour where the part has one and the file has not several of its own.
 pub(super) fn of_file(part: &SeenPart, mesh: &VisualMesh) -> Vec<Paint> {
-    let own = part.color.map(Paint::of_color);
+    let of_part = part.color.map(Paint::of_color);
     let mut colors = mesh.colors.iter().flatten();
     let first = colors.next();
     // most files of one colour have it from an exporter's default
     let is_plain = colors.all(|color| Some(color) == first);
-    let paint = |color: &Option<Color>| match (color, own) {
-        (_, Some(own)) if is_plain => own,
+    let paint = |color: &Option<Color>| match (color, of_part) {
+        (_, Some(paint)) if is_plain => paint,
         (Some(color), _) => of_bytes(*color),
-        (None, own) => own.unwrap_or(Paint::PLAIN),
+        (None, paint) => paint.unwrap_or(Paint::PLAIN),
     };
     mesh.colors.iter().map(paint).collect()
 }

@@ -6,6 +6,7 @@ use sim_render::{Frame, Image, Scratch};
 
 use super::chance::Moment;
 use super::fields::{ImageField, Plane};
+use super::images::spare_pixels;
 use super::memory::{Memory, State};
 use super::sight::{Eye, Sight};
 
@@ -15,15 +16,15 @@ pub(super) struct Part {
     scratch: Scratch,
     /// Frames of a world's bodies.
     frames: Vec<Frame>,
-    /// Depths of images of which other planes are asked for.
+    /// Depths of images without a field of depths.
     spare: Vec<f32>,
     repeats: Vec<Repeat>,
 }
 
 /// The last images of a camera that draws none in some frames.
 struct Repeat {
-    /// Step of each world's; none before the first one.
-    drawn: Vec<Option<u64>>,
+    /// When each world's was drawn; none before the first one, and where the next frame has a new one.
+    drawn: Vec<Option<Moment>>,
     /// Images of each world, one after the other.
     bytes: Vec<u8>,
     of_world: usize,
@@ -31,11 +32,9 @@ struct Repeat {
 
 impl Part {
     pub(super) fn new(sight: &Sight, fields: &[ImageField], worlds: Range<usize>) -> Part {
-        let mut spare = 0;
         let repeats = sight.eyes.iter().map(|eye| {
-            let own = fields.iter().filter(|field| field.camera == eye.number);
-            let of_world = own.map(|field| field.bytes() / field.shape[0]).sum();
-            spare = spare.max(eye.camera.width * eye.camera.height);
+            let seen = fields.iter().filter(|field| field.camera == eye.number);
+            let of_world = seen.map(|field| field.bytes() / field.shape[0]).sum();
             let kept = if eye.every > 1 { worlds.len() } else { 0 };
             Repeat {
                 drawn: vec![None; kept],
@@ -48,8 +47,14 @@ impl Part {
             worlds,
             scratch: Scratch::default(),
             frames: Vec::with_capacity(sight.segments.len()),
-            spare: vec![0.0; spare],
+            spare: vec![0.0; spare_pixels(sight, fields)],
         }
+    }
+
+    /// Draws all images of the next frame, whatever its step.
+    pub(super) fn forget(&mut self) {
+        let repeats = self.repeats.iter_mut();
+        repeats.for_each(|repeat| repeat.drawn.fill(None));
     }
 
     pub(super) fn draw(
@@ -58,6 +63,7 @@ impl Part {
         fields: &[ImageField],
         state: &State,
         images: Memory,
+        keeps: bool,
     ) {
         for world in self.worlds.clone() {
             state.frames(world, &mut self.frames);
@@ -67,19 +73,20 @@ impl Part {
                     self.draw_image(sight, eye, fields, (world, moment), images);
                     continue;
                 }
-                let steps = moment.step;
-                let own = world - self.worlds.start;
-                let drawn = self.repeats[place].drawn[own];
-                let is_due = steps.is_multiple_of(eye.every)
-                    || drawn
-                        .is_none_or(|then| then > steps || then / eye.every < steps / eye.every);
+                let place_in_part = world - self.worlds.start;
+                let repeat = &self.repeats[place];
+                let is_due = repeat.drawn[place_in_part]
+                    .is_none_or(|then| !moment.repeats(&then, eye.every));
                 if is_due {
                     self.draw_image(sight, eye, fields, (world, moment), images);
-                    self.repeats[place].drawn[own] = Some(steps);
+                    if !keeps {
+                        continue;
+                    }
+                    self.repeats[place].drawn[place_in_part] = Some(moment);
                 }
                 let mine = fields.iter().filter(|field| field.camera == eye.number);
                 self.repeats[place].exchange(
-                    own,
+                    place_in_part,
                     is_due,
                     mine.map(|field| {
                         // SAFETY: this world is ours alone, and so are its rows, one after the other
@@ -98,8 +105,10 @@ impl Part {
         (world, moment): (usize, Moment),
         images: Memory,
     ) {
-        let own = fields.iter().filter(|field| field.camera == eye.number);
-        let plane = |plane| own.clone().find(|field| field.plane == plane);
+        let plane = |plane| {
+            let mut fields = fields.iter();
+            fields.find(|field| field.camera == eye.number && field.plane == plane)
+        };
         let (depth, labels) = (plane(Plane::Depth), plane(Plane::Segmentation));
         let rgb = plane(Plane::Rgb);
         let frame = match eye.body {
@@ -108,12 +117,10 @@ impl Part {
         };
         let (frame, camera) = eye.chance.moved(&moment, &frame, &eye.camera);
         let pixels = eye.camera.width * eye.camera.height;
+        // SAFETY: this world is ours alone, and its rows are apart
+        let depths = depth.map(|field| unsafe { images.row(field, world) });
         let mut image = Image {
-            // SAFETY: this world is ours alone, and its rows are apart
-            depth: match depth {
-                Some(field) => unsafe { images.row(field, world) },
-                None => &mut self.spare[..pixels],
-            },
+            depth: depths.unwrap_or_else(|| &mut self.spare[..pixels]),
             // SAFETY: as above
             labels: labels.map(|field| unsafe { images.row(field, world) }),
             // SAFETY: as above

@@ -58,7 +58,8 @@ pub(super) fn seen(looks: &Looks, segments: &mut Segments, sees: Sees) -> (Vec<P
     };
     let mut parts = Vec::new();
     for part in chosen {
-        let body = part.body.as_ref().and_then(|body| segments.body(body));
+        let place = |body: &String| segments.body(body).expect("links are bodies of the model");
+        let body = part.body.as_ref().map(place);
         let label = body.unwrap_or_else(|| segments.of_world(&part.name));
         let painted = reader.looks(part, body);
         parts.extend(painted.into_iter().map(|(look, paint)| Part {
@@ -79,8 +80,9 @@ fn visuals<'a>(parts: &'a [SeenPart], reader: &mut Reader) -> Vec<&'a SeenPart> 
         .iter()
         .filter(is_visual)
         .partition(|part| reader.can_read(part));
-    let lost: HashSet<_> = lost.into_iter().map(|part| &part.body).collect();
-    let whole = |part: &&SeenPart| !lost.contains(&part.body);
+    let link = |part: &'a SeenPart| (&part.robot, &part.body);
+    let lost: HashSet<_> = lost.into_iter().map(link).collect();
+    let whole = |part: &&'a SeenPart| !lost.contains(&link(part));
     let clad: HashSet<_> = readable
         .iter()
         .filter(|part| whole(part))
@@ -91,9 +93,9 @@ fn visuals<'a>(parts: &'a [SeenPart], reader: &mut Reader) -> Vec<&'a SeenPart> 
         .filter(is_visual)
         .map(|part| &part.robot)
         .collect();
-    let stands_in = |part: &&SeenPart| match part.kind {
+    let stands_in = |part: &&'a SeenPart| match part.kind {
         PartKind::Collision { added } => {
-            added || lost.contains(&part.body) || !dressed.contains(&part.robot)
+            added || lost.contains(&link(part)) || !dressed.contains(&part.robot)
         }
         PartKind::Bone => !clad.contains(&part.robot),
         PartKind::Visual | PartKind::Site => false,
@@ -131,6 +133,13 @@ impl Reader {
     /// What a part looks like, a look for each of its colours.
     fn looks(&mut self, part: &SeenPart, body: Option<usize>) -> Vec<(Look, Paint)> {
         let paint = paint::of_part(part, body);
+        if let (Some(texture), None) = (&part.texture, part.color) {
+            let file = texture.display();
+            self.notes.push(format!(
+                "cameras see {} in grey: they do not read its texture {file}",
+                part.name
+            ));
+        }
         let squares = Paint {
             squares: true,
             ..paint
@@ -169,13 +178,19 @@ impl Reader {
         if !self.files.contains_key(&key) {
             let read = VisualMesh::load(path, up_axis);
             let read = read.map_err(|error| self.note(part, &error.to_string()));
+            let notes = read.iter().flat_map(|mesh| &mesh.notes);
+            self.notes
+                .extend(notes.map(|note| format!("visual mesh {}: it {note}", path.display())));
             self.files.insert(key.clone(), read.ok().map(Arc::new));
         }
         self.files[&key].clone()
     }
 
     fn note(&mut self, part: &SeenPart, problem: &str) {
-        let note = format!("cameras see no visual {}: {problem}", part.name);
+        let note = format!(
+            "cameras see the collision shapes of a link, if it has any, and not its visual {}: {problem}",
+            part.name
+        );
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
@@ -200,19 +215,19 @@ fn scaled(mesh: &VisualMesh, scale: [f64; 3]) -> TriMesh {
 
 /// The triangles of each paint.
 fn by_paint(mesh: &TriMesh, paints: &[Paint]) -> Vec<(Look, Paint)> {
-    let mut groups: Vec<(Paint, Vec<[u32; 3]>)> = Vec::new();
+    let mut groups: Vec<(Paint, TriMesh)> = Vec::new();
+    let mut places: HashMap<([u32; 4], bool), usize> = HashMap::new();
     for (&triangle, paint) in mesh.triangles.iter().zip(paints) {
-        match groups.iter_mut().find(|(other, _)| other == paint) {
-            Some((_, triangles)) => triangles.push(triangle),
-            None => groups.push((*paint, vec![triangle])),
-        }
+        let key = (paint.color.map(f32::to_bits), paint.squares);
+        let place = *places.entry(key).or_insert_with(|| {
+            groups.push((*paint, TriMesh::default()));
+            groups.len() - 1
+        });
+        let group = &mut groups[place].1;
+        let first = group.vertices.len() as u32;
+        group.vertices.extend(mesh.corners(triangle));
+        group.triangles.push([first, first + 1, first + 2]);
     }
-    let look = |(paint, triangles)| {
-        let mesh = TriMesh {
-            vertices: mesh.vertices.clone(),
-            triangles,
-        };
-        (Look::Triangles(Arc::new(mesh)), paint)
-    };
+    let look = |(paint, mesh)| (Look::Triangles(Arc::new(mesh)), paint);
     groups.into_iter().map(look).collect()
 }

@@ -83,7 +83,7 @@ impl Sight {
             fields,
             draw,
             segments: Vec::new(),
-            notes: Vec::new(),
+            notes: looks.notes.clone(),
         };
         let mut segments = Segments::new(model.body_names());
         for (number, camera) in description.cameras.iter().enumerate() {
@@ -130,7 +130,7 @@ fn eye(
             near: camera.near as f32,
             far: camera.far as f32,
         },
-        body: body.and_then(place),
+        body: body.map(|name| place(name).expect("links are bodies of the model")),
         frame: Frame::from(&pose),
         every: camera.every as u64,
         chance: Chance::new(number, camera),

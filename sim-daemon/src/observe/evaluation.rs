@@ -2,12 +2,26 @@
 
 use std::path::Path;
 
-use sim_engine::simulation::{Options, Precision, Simulation};
+use sim_engine::simulation::{Draws, Options, Precision, Simulation};
+
+use sim_protocol::ProtocolError;
+use sim_protocol::host::free_memory;
 
 use crate::config;
 use crate::error::DaemonError;
 use crate::export::arrays::Arrays;
 use crate::eyes::{Eyes, FrameFields, Images, Sight};
+
+/// What the draws of a daemon's worlds depend on, as its description has it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Drawn {
+    /// World number of the first world.
+    pub first_world: usize,
+    /// Whether draws depend on the world's number.
+    pub draws: Draws,
+    /// Whether worlds are reset after a fault.
+    pub resets: bool,
+}
 
 /// Worlds of a scene that are set to given states and evaluated, in this process and on one thread.
 pub struct Evaluation {
@@ -27,6 +41,7 @@ impl Evaluation {
         worlds: usize,
         precision: Precision,
         asked: &FrameFields,
+        drawn: Drawn,
     ) -> Result<Evaluation, DaemonError> {
         let mut scene = config::parse(scene, "scene")?;
         scene.cameras.extend(asked.cameras.iter().cloned());
@@ -37,13 +52,24 @@ impl Evaluation {
             worlds,
             precision,
             threads: Some(1),
+            first_world: drawn.first_world,
+            draws: drawn.draws,
             fields: asked.fields.clone(),
             // it never steps
             compiles: false,
             ..Options::default()
         };
+        let images = Images::new(sight, &Simulation::layout_of(&model, &options))?;
+        let needed = (images.arena_bytes() as u64)
+            .saturating_add(images.memory_bytes(1))
+            .saturating_add(Simulation::memory_of(&model, &options));
+        let free = free_memory();
+        if needed > free {
+            let what = format!("to evaluate {worlds} worlds");
+            return Err(ProtocolError::Memory { free, needed, what }.into());
+        }
         let simulation = Simulation::new(model, &options)?;
-        let eyes = Eyes::alone(&Images::new(sight, simulation.layout())?, &simulation)?;
+        let eyes = Eyes::alone(&images, &simulation, drawn.resets)?;
         Ok(Evaluation {
             arrays: Arrays::new(&simulation, eyes.images()),
             simulation,
@@ -66,7 +92,7 @@ impl Evaluation {
             problem: error.to_string(),
         })?;
         self.simulation.forward(self.arrays.arena());
-        self.eyes.draw(&self.simulation, self.arrays.arena());
+        self.eyes.draw(&self.simulation, self.arrays.arena(), false);
         Ok(&self.arrays)
     }
 }

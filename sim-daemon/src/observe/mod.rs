@@ -6,8 +6,8 @@ mod evaluation;
 pub use crate::export::arrays::{Array, Arrays};
 pub use crate::eyes::FrameFields;
 
-pub use evaluation::Evaluation;
-pub use sim_engine::simulation::Precision;
+pub use evaluation::{Drawn, Evaluation};
+pub use sim_engine::simulation::{Draws, Precision};
 pub use sim_physics::arrays::Field;
 pub use sim_protocol::Dtype;
 

@@ -94,13 +94,19 @@ impl Run {
         let daemon = &head.daemon;
         let scene = config::parse(&daemon.scene, "of the recording");
         let mut scene = scene.map_err(|error| failed(error.to_string()))?;
-        scene.cameras.extend(asked.cameras.iter().cloned());
         let described = scene.describe(Path::new(&daemon.scene_folder));
         let described = described.map_err(|error| {
             failed(format!(
                 "needs the scene's robots and meshes where they were: {error}"
             ))
         })?;
+        let described = match asked.cameras.is_empty() {
+            true => described,
+            false => {
+                scene.cameras.extend(asked.cameras.iter().cloned());
+                scene.describe(Path::new(&daemon.scene_folder))?
+            }
+        };
         let model = described
             .compile()
             .map_err(|error| failed(error.to_string()))?;
@@ -156,8 +162,10 @@ impl Run {
                 daemon.worlds
             )));
         }
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let images = Images::new(sight, &Simulation::layout_of(&model, &options))?;
-        let frame = (images.arena_bytes() as u64).saturating_add(images.memory_bytes());
+        let frame = (images.arena_bytes() as u64)
+            .saturating_add(images.memory_bytes(threads.unwrap_or_else(cores)));
         let needed = frame.saturating_add(Simulation::memory_of(&model, &options));
         let free = free_memory();
         if needed > free {
@@ -167,7 +175,7 @@ impl Run {
         }
         let simulation =
             Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
-        let eyes = Eyes::alone(&images, &simulation)?;
+        let eyes = Eyes::alone(&images, &simulation, options.faults.resets)?;
         let info = RunInfo {
             scene: &described,
             scene_text: String::new(),
@@ -194,6 +202,7 @@ impl Run {
     pub(super) fn restore(&mut self, path: &Path, state: &[u8]) -> Result<(), DaemonError> {
         let restored = self.simulation.restore(state, None, None);
         restored.map_err(|error| unreadable(path, error.to_string()))?;
+        self.eyes.forget();
         self.has_state = true;
         Ok(())
     }
@@ -242,6 +251,6 @@ impl Run {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
-        self.eyes.draw(&self.simulation, arena);
+        self.eyes.draw(&self.simulation, arena, true);
     }
 }

@@ -63,6 +63,9 @@ fn serve(
                     }
                     None => apply(simulation, host, &mut mask, &mut ik),
                 };
+                if host.inbox().op() == Op::Restore {
+                    eyes.forget();
+                }
                 // its file may be gone when the recording is replayed
                 if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
                     record_state(simulation, host, true);
@@ -76,6 +79,7 @@ fn serve(
                             simulation,
                             eyes,
                             advance,
+                            keeps: true,
                             watched,
                         };
                         match host.inbox().op() {
@@ -99,6 +103,7 @@ fn serve(
                         simulation,
                         eyes,
                         advance: Advance::Step,
+                        keeps: true,
                         watched,
                     };
                     host.advance(&mut scratch, &mut shown);
@@ -114,6 +119,7 @@ fn serve(
                     simulation,
                     eyes,
                     advance: Advance::Forward,
+                    keeps: false,
                     watched,
                 };
                 host.show(&mut scratch, &mut shown);
@@ -124,7 +130,11 @@ fn serve(
             }
             // handled above
             Next::LeaseEnded => {}
-            Next::Record => record_state(simulation, host, false),
+            Next::Record => {
+                // a replay has the state, and no images that came before
+                eyes.forget();
+                record_state(simulation, host, false);
+            }
             Next::End => return Ok(()),
         }
         // the client has its frame, and need not wait for this

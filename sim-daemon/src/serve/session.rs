@@ -9,7 +9,6 @@ use sim_engine::options::{self, Adapter};
 use sim_engine::simulation::{
     Device, Draws, Faults, Lanes, Options, OutputsAt, Precision, Simulation,
 };
-use sim_physics::arrays::Field;
 use sim_protocol::daemon_lock::DaemonLock;
 use sim_protocol::descriptors::make_room_for;
 use sim_protocol::host::{Host, check_memory};
@@ -252,7 +251,6 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     let model = description.compile()?;
     options.checked_with = options::machine_code_check(&model);
     let sight = Sight::open(&scene, &folder, &description, &model, &images)?;
-    let unseen: Vec<_> = sight.iter().flat_map(|sight| sight.notes.clone()).collect();
     let layout = Simulation::layout_of(&model, &options);
     let images = Images::new(sight, &layout)?;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -271,14 +269,14 @@ fn open(serve: &Serve, watchdog: &Watchdog) -> Result<Opened, DaemonError> {
     let mut announced = export::description(&model, &options, &layout, info);
     announced.groups = count;
     // before anything large is taken: memory that is missing kills instead of failing
-    let own = Simulation::memory_of(&model, &options).saturating_add(images.memory_bytes());
-    check_memory(&announced, &table, own)?;
+    let physics = Simulation::memory_of(&model, &options);
+    let beside = images.memory_bytes(threads);
+    check_memory(&announced, &table, physics.saturating_add(beside))?;
     announced.warnings = advice(&description, &model);
     announced.pace = pace::pace(serve, model.dt() * model.substeps() as f64)?;
     announced.notes.extend(refusals);
-    announced.notes.extend(unseen);
     let simulations = Simulation::groups(model, &options, count)?;
-    let eyes = Eyes::of_groups(&images, threads, count)?;
+    let eyes = Eyes::of_groups(&images, threads, count, options.faults.resets)?;
     announced.notes.extend(pace::lock_memory(serve));
     announced.notes.extend(perf_map::write(&simulations[0]));
     announced.state_bytes = simulations[0].snapshot_bytes(announced.worlds) as u64;
@@ -384,18 +382,7 @@ fn check(serve: &Serve) -> Result<(Options, Vec<String>), DaemonError> {
             "ask for at least 1".to_owned(),
         );
     }
-    let names = serve.fields.iter().map(|name| name.trim());
-    let asked = match FrameFields::named(names.filter(|name| !name.is_empty())) {
-        Ok(asked) => asked,
-        Err(name) => {
-            let known: Vec<_> = Field::ALL.iter().map(|field| field.row().name).collect();
-            return wrong(
-                "fields",
-                &name,
-                format!("unknown field; known are {}", known.join(", ")),
-            );
-        }
-    };
+    let asked = FrameFields::of_argument(&serve.fields)?;
     if !matches!(serve.on_fault.as_str(), "freeze" | "reset") {
         let problem = "unknown; use freeze or reset".to_owned();
         return wrong("on-fault", &serve.on_fault, problem);

@@ -15,6 +15,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) simulation: &'a mut Simulation,
     pub(crate) eyes: &'a mut Eyes,
     pub(crate) advance: Advance,
+    /// Whether the frame is the client's, whose images later frames may repeat.
+    pub(crate) keeps: bool,
     /// Worlds that observers see.
     pub(crate) watched: usize,
 }
@@ -32,8 +34,11 @@ impl Worlds for Shown<'_> {
             Advance::Step => self.simulation.step(arena),
             Advance::Forward => self.simulation.forward(arena),
         }
-        self.eyes.draw(self.simulation, arena);
-        self.simulation.lost().is_none()
+        let is_there = self.simulation.lost().is_none();
+        if is_there {
+            self.eyes.draw(self.simulation, arena, self.keeps);
+        }
+        is_there
     }
 
     fn on_device(&mut self) -> Option<(usize, u64)> {

@@ -282,3 +282,58 @@ def test_noise_of_depths_has_its_standard_deviation_and_differs_from_frame_to_fr
         assert abs(error.mean()) < 0.0015 and error.std() == pytest.approx(0.01 + 0.005 * 4.0, rel=0.05)
     assert abs(np.corrcoef(first[0].ravel(), second[0].ravel())[0, 1]) < 0.06
     assert abs(np.corrcoef(first[0].ravel(), first[1].ravel())[0, 1]) < 0.06
+
+
+def test_a_recording_that_begins_between_two_images_is_replayed(tmp_path: Path) -> None:
+    scene, camera = tumbling(every=5)
+    file = tmp_path / "run.tlrec"
+    with tl.launch(scene, worlds=2, fields=("joint_q", *camera.fields)) as sim:
+        sim.reset(seed=3)
+        for _ in range(7):
+            sim.step()
+        with sim.record(file):
+            for _ in range(6):
+                sim.step()
+            state = sim.snapshot()
+            for _ in range(4):
+                sim.step()
+            sim.restore(state)
+            for _ in range(3):
+                sim.step()
+    subprocess.run([sys.executable, "-m", "tightloop", "replay", file], check=True)
+
+
+def test_a_fault_ends_an_episode_with_its_own_image_and_the_next_one_has_another() -> None:
+    scene = tl.Scene(dt=1 / 480, substeps=4)
+    scene.add_ground()
+    scene.add_body(name="ball", pos=(0, 0, 3))
+    scene.add_sphere(body="ball", radius=0.1)
+    above = scene.add_camera(pos=(0, 0, 6), target=(0, 0, 0), width=8, height=8, every=1000, name="above")
+    scene.add_camera(pos=(0.5, 0, 6), target=(0.5, 0, 0), width=8, height=8, name="mounted")
+    scene.randomize(cameras={name: {"z": tl.Uniform(-0.5, 0.5)} for name in ("above", "mounted")})
+    fields = ("status", "body_q", above.depth, "mounted_depth")
+    with tl.launch(scene, worlds=1, fields=fields[1:], bounds={"joint_qd": 3.0}, on_fault="reset") as sim:
+        sim.reset(seed=1)
+        shown = [sim.step().copy() for _ in range(120)]
+    faulted = [int(frame.status[0]) & 8 != 0 for frame in shown]
+    first = faulted.index(True)
+    assert 5 < first < 100
+    corner = [(frame.above_depth[0, 0, 0], frame.mounted_depth[0, 0, 0]) for frame in shown]
+    # all frames of an episode, the one with the fault too, have one mount and one image; the next have others
+    assert len({heights for heights in corner[: first + 1]}) == 1
+    assert corner[first + 1] != corner[first] and corner[first + 1][0] != corner[first][0]
+
+
+def test_observers_of_a_group_see_its_mounts() -> None:
+    scene = tl.Scene()
+    scene.add_ground()
+    camera = scene.add_camera(pos=(0, 0, 2), target=(0, 0, 0), width=4, height=4, name="above")
+    scene.randomize(cameras={"above": {"z": tl.Uniform(-0.5, 0.5)}})
+    with tl.launch(scene, worlds=4, groups=2, fields=(camera.depth,)) as groups:
+        frame = groups[1].reset(seed=3)
+        live = Live(groups[1].name, fields=(camera.depth,))
+        try:
+            shown = live.poll(10.0)
+            assert shown is not None and np.array_equal(shown.above_depth, frame.above_depth)
+        finally:
+            live.close()

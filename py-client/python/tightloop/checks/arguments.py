@@ -24,6 +24,7 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
 _INT_MAX = 2**63 - 1
 # Rounding to four digits stays below this; more is a mistake such as degrees or Euler angles.
 _QUAT_NORM_SLACK = 1e-3
+_QUAT_NORM_ROUNDING = 4e-16
 
 
 def number(
@@ -113,6 +114,8 @@ def quaternion(what: str, values: Vector) -> Quaternion:
     norm = math.hypot(x, y, z, w)
     if abs(norm - 1.0) > _QUAT_NORM_SLACK:
         raise SceneError(f"{what} {(x, y, z, w)} has length {norm:.4g}; give a unit quaternion (x, y, z, w)")
+    if abs(norm - 1.0) < _QUAT_NORM_ROUNDING:
+        return x, y, z, w  # so that what was normalised keeps its bits
     return x / norm, y / norm, z / norm, w / norm
 
 

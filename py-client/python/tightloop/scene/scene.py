@@ -22,8 +22,8 @@ from tightloop.mujoco.model import MujocoModel
 from tightloop.mujoco.scene_models import HULL_VERTICES, check_options, read_model
 from tightloop.scene import make_sensors, make_shapes, options, randomization, scene_file, urdf
 from tightloop.scene.body import Body
-from tightloop.scene.cameras import make_camera
-from tightloop.scene.cameras.camera import Camera, Sees
+from tightloop.scene.cameras.camera import Camera
+from tightloop.scene.cameras.methods import CameraMethods
 from tightloop.scene.entity import Entity
 from tightloop.scene.options import Cone, FrictionCombine, Options
 from tightloop.scene.parts import Collidable, FreeNames, collidable_name, part_names, summary
@@ -43,7 +43,7 @@ Part = TypeVar("Part", bound=Entity)
 
 
 @checked_calls
-class Scene(Primitives):
+class Scene(CameraMethods, Primitives):
     """A scene: robots, bodies and shapes, time step and solver options, and what varies between worlds.
 
     In the arrays of a frame, robots come first, then bodies, each in the order in which they were added.
@@ -655,88 +655,6 @@ class Scene(Primitives):
             SceneError: A value is out of range, or the body does not exist; the message names it.
         """
         return make_sensors.add_height_scan(self, name=name, body=body, pos=pos, size=size, shape=shape, reach=reach)
-
-    def add_camera(
-        self,
-        *,
-        width: int | None = None,
-        height: int | None = None,
-        fov: float | None = None,
-        body: Body | Link | str | None = None,
-        pos: Vector = ORIGIN,
-        quat: Vector | None = None,
-        target: Vector | None = None,
-        focal: Vector | None = None,
-        center: Vector | None = None,
-        near: float = 0.01,
-        far: float = 10.0,
-        every: int = 1,
-        sees: Sees = "visuals",
-        depth_noise: Vector = (0.0, 0.0),
-        mujoco: str | None = None,
-        name: str | None = None,
-    ) -> Camera:
-        """Add a camera, whose images are fields of frames: depths, labels and colours, in every world.
-
-        Its frame has x to the right of the image, y down and z forward. A ray goes through the middle of each pixel.
-        Depths are measured along z, as by depth cameras, and not along the ray. Images show the state of their frame.
-        They cost nothing where ``launch(fields=...)`` does not ask for them.
-
-        >>> wrist = scene.add_camera(body=arm.link("fr3_hand"), pos=(0.05, 0, 0), width=64, height=64, name="wrist")
-        >>> with tl.launch(scene, worlds=1024, fields=("joint_q", wrist.depth)) as sim:
-        ...     frame = sim.reset()
-        ...     frame.wrist_depth  # (1024, 64, 64), a view of shared memory
-
-        Args:
-            width: Pixels of a row, 1 to 4096.
-            height: Rows, 1 to 4096.
-            fov: Vertical field of view [rad], 0.001 to 3.1; 45° if left out, as in MuJoCo.
-            body: Body that carries the camera, a robot's link (``robot.link("hand")``), or the name of either; links of
-                a MuJoCo model as ``"model/body"``. None for a camera that is fixed in the world.
-            pos: Position in the frame of the body [m].
-            quat: Orientation in that frame (x, y, z, w); z of the camera is z of the frame if left out.
-            target: Point in the frame of the body that the camera looks at, instead of ``quat`` [m]. The frame's z axis
-                is up in the image.
-            focal: Measured focal lengths along x and y, instead of ``fov`` [pixels].
-            center: Principal point with ``focal``, from the upper left corner [pixels]; the middle if left out.
-            near: Nearest depth that is seen [m].
-            far: Farthest depth that is seen [m].
-            every: Control frames from one image to the next. An image is drawn at each multiple of it in a world's
-                ``step``, and frames repeat it in between.
-            sees: What is seen of robots whose files have both: ``"visuals"`` or ``"collisions"``. Links without visuals
-                are seen by their collision shapes.
-            depth_noise: Standard deviation of depths, ``(a, b)``: a + b z² of a depth z [m, 1/m]. Each pixel of each
-                frame has a draw of its own.
-            mujoco: A camera of a MuJoCo model, ``"model/camera"``: this one has its body, place and lens, and its
-                resolution if ``width`` and ``height`` are left out.
-            name: Unique name, a Python identifier of 19 letters at most; ``camera``, ``camera_2``, … if left out.
-
-        Returns:
-            The camera, which has the names of its fields: ``camera.depth``, ``camera.segmentation`` and
-            ``camera.rgb``.
-
-        Raises:
-            SceneError: A value is out of range, or the body does not exist; the message names it.
-        """
-        return make_camera.add_camera(
-            self,
-            name=name,
-            mujoco=mujoco,
-            body=body,
-            pos=pos,
-            quat=quat,
-            target=target,
-            width=width,
-            height=height,
-            fov=fov,
-            focal=focal,
-            center=center,
-            near=near,
-            far=far,
-            every=every,
-            sees=sees,
-            depth_noise=depth_noise,
-        )
 
     def randomize(
         self,

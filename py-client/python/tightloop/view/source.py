@@ -117,7 +117,12 @@ class Live:
             self.worlds = min(asked, self.info["watch_worlds"])
             self.period: float = self.info["dt"] * self.info["substeps"]
             self._evaluation = _core.Evaluation(
-                self.info["scene"], self.info["scene_folder"], self.worlds, self.info["precision"], list(fields)
+                self.info["scene"],
+                self.info["scene_folder"],
+                self.worlds,
+                self.info["precision"],
+                list(fields),
+                drawn=(self.info["first_world"], self.info["draws"], self.info["on_fault"] == "reset"),
             )
             if self._evaluation.model_hash != self.info["model_hash"]:
                 raise SceneError(f"the files of simulation `{name}` have changed since it started; launch it again")

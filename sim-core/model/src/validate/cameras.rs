@@ -3,7 +3,7 @@
 use super::shape::pose;
 use crate::description::{Camera, CameraPart, Description, Lens};
 use crate::error::ModelError;
-use crate::value_checks::{count, in_range, positive, unique, within};
+use crate::value_checks::{count, in_range, unique, within};
 
 /// Most cameras: each has a stream of random numbers.
 const CAMERAS_MAX: f64 = 100.0;
@@ -54,14 +54,12 @@ impl Description {
                 }
             }
         }
-        positive(&format!("{what}: near"), camera.near)?;
-        let rule = "it must be above `near`";
-        in_range(
-            &format!("{what}: far"),
-            camera.far,
-            camera.far > camera.near,
-            rule,
-        )?;
+        let holds = (1e-6..=1e6).contains(&camera.near);
+        let rule = "it must be between 1e-6 and 1e6 m";
+        in_range(&format!("{what}: near"), camera.near, holds, rule)?;
+        let holds = camera.far > camera.near && camera.far <= 1e6;
+        let rule = "it must be above `near`, and at most 1e6 m";
+        in_range(&format!("{what}: far"), camera.far, holds, rule)?;
         let rule = "it must be between 1 and 1000000 frames";
         count(&format!("{what}: every"), camera.every, EVERY_MAX, rule)?;
         for value in camera.depth_noise {
@@ -133,13 +131,17 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_camera_is_named() {
         assert_eq!(problem(vec![camera()]), "");
-        let wrong: [(&str, fn(&mut Camera)); 13] = [
+        type Change = (&'static str, fn(&mut Camera));
+        let wrong: [Change; 14] = [
             ("`a b`", |camera| camera.name = "a b".to_owned()),
             ("`3d`", |camera| camera.name = "3d".to_owned()),
             ("at most 19 bytes", |camera| camera.name = "c".repeat(20)),
-            ("camera `wrist`: body or link", |camera| {
-                camera.body = Some("arm/hand".to_owned());
-            }),
+            (
+                "camera `wrist`: there is no body or link `arm/hand`",
+                |camera| {
+                    camera.body = Some("arm/hand".to_owned());
+                },
+            ),
             ("width", |camera| camera.width = 0),
             ("height", |camera| camera.height = 5000),
             ("fov", |camera| camera.lens = Lens::Fov(3.2)),
@@ -152,6 +154,7 @@ mod tests {
             }),
             ("near", |camera| camera.near = 0.0),
             ("far", |camera| camera.far = camera.near),
+            ("far", |camera| camera.far = 1e40),
             ("every", |camera| camera.every = 0),
             ("depth_noise", |camera| camera.depth_noise = [0.0, -1.0]),
         ];

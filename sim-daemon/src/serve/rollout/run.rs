@@ -71,7 +71,7 @@ impl Rollouts {
                 .resize(eyes.images().arena_bytes().div_ceil(8), 0);
             // the policy sees the present state, which no frame may have shown
             simulation.forward(&mut self.arena);
-            eyes.draw(simulation, &mut self.arena);
+            eyes.draw(simulation, &mut self.arena, false);
         }
         match simulation.precision() {
             Precision::F32 => self.run::<f32>(&asked, (simulation, eyes), steps, watched),
@@ -219,6 +219,7 @@ impl<R: Real> Rollout<'_, R> {
             simulation,
             eyes,
             advance: Advance::Step,
+            keeps: true,
             watched: self.watched,
         };
         let is_waited_for = steps.carry_out(arena, &mut shown);

@@ -20,6 +20,9 @@ from tightloop.scene.shapes import ORIGIN
 FOV = math.pi / 4
 #: Most pixels along an axis.
 PIXELS_MAX = 4096
+_NEAR_MIN, _FAR_MAX = 1e-6, 1e6  # [m]
+_FOCAL_MIN, _FOCAL_MAX = 1e-2, 1e7  # [pixels]
+_EVERY_MAX, _NOISE_MAX = 1_000_000, 1000.0
 #: Longest name [bytes].
 NAME_MAX = 19
 
@@ -83,7 +86,9 @@ def add_camera(
     noise = checks.pair(f"{what}: depth_noise", depth_noise)
     if min(noise) < 0.0:
         raise SceneError(f"{what}: depth_noise is {noise}; give no negative numbers")
-    nearest = checks.number(f"{what}: near", near, above=0.0)
+    if max(noise) > _NOISE_MAX:
+        raise SceneError(f"{what}: depth_noise is {noise}; give at most {_NOISE_MAX:g}")
+    nearest = _within(f"{what}: near", checks.number(f"{what}: near", near, above=0.0))
     added = taken[name] = Camera(
         name=name,
         body=None if body is None else bearer_name(scene, what, body),
@@ -93,12 +98,25 @@ def add_camera(
         height=pixels[1],
         **_lens(what, fov, focal, center, pixels),
         near=nearest,
-        far=checks.number(f"{what}: far", far, above=nearest),
-        every=checks.integer(f"{what}: every", every),
+        far=_within(f"{what}: far", checks.number(f"{what}: far", far, above=nearest)),
+        every=_frames(f"{what}: every", every),
         sees=sees,
         depth_noise=noise,
     )
     return added
+
+
+def _within(what: str, depth: float) -> float:
+    if not _NEAR_MIN <= depth <= _FAR_MAX:
+        raise SceneError(f"{what} is {depth!r}; give {_NEAR_MIN:g} to {_FAR_MAX:g} m")
+    return depth
+
+
+def _frames(what: str, every: int) -> int:
+    count = checks.integer(what, every)
+    if count > _EVERY_MAX:
+        raise SceneError(f"{what} is {count}; give at most {_EVERY_MAX} frames")
+    return count
 
 
 def _lens(
@@ -118,5 +136,6 @@ def _lens(
         raise SceneError(f"{what}: both fov and focal are given; give one of them")
     lengths = checks.pair(f"{what}: focal", focal)
     for length in lengths:
-        checks.number(f"{what}: focal", length, above=0.0)
+        if not _FOCAL_MIN <= length <= _FOCAL_MAX:
+            raise SceneError(f"{what}: focal is {length!r}; give {_FOCAL_MIN:g} to {_FOCAL_MAX:g} pixels")
     return {"focal": lengths, "center": middle if center is None else checks.pair(f"{what}: center", center)}

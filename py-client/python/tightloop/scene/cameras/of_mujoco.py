@@ -38,29 +38,29 @@ def of_mujoco(scene: Parts, what: str, name: str, width: int | None, height: int
     cameras = scene.models[model].cameras
     if camera not in cameras:
         raise SceneError(f"{what}: model `{model}` has no camera {camera!r}; it has {', '.join(cameras) or 'none'}")
-    found = cameras[camera]
-    if not found["is_fixed"]:
+    like = cameras[camera]
+    if not like["is_fixed"]:
         raise SceneError(
             f"{what}: `{name}` tracks or targets a body; cameras here are fixed to theirs: give body, pos and target"
         )
-    own = found["resolution"]
-    has_own = max(own) > 1
-    if has_own:
-        width, height = own[0] if width is None else width, own[1] if height is None else height
-    focal, center = found["focal"], found["center"]
+    resolution = like["resolution"]
+    if max(resolution) > 1:
+        width = resolution[0] if width is None else width
+        height = resolution[1] if height is None else height
+    focal, center = like["focal"], like["center"]
     if focal is not None and width is not None and height is not None:
-        scale = (width / own[0], height / own[1])
+        scale = (width / resolution[0], height / resolution[1])
         focal = (focal[0] * scale[0], focal[1] * scale[1])
         center = (center[0] * scale[0], center[1] * scale[1])
-    x, y, z = found["pos"]
-    qx, qy, qz, qw = found["quat"]
+    x, y, z = like["pos"]
+    qx, qy, qz, qw = like["quat"]
     return MujocoCamera(
-        body=f"{model}/{found['link']}",
+        body=f"{model}/{like['link']}",
         pos=(x, y, z),
         quat=(qx, qy, qz, qw),
         width=width,
         height=height,
-        fov=found["fov"],
+        fov=like["fov"],
         focal=focal,
         center=center,
     )

@@ -45,7 +45,7 @@ impl Robot {
         let links = names(file, "body", file.rows("body_parentid"))?;
         let places = on_links(file, "cam", links.len())?;
         let count = places.len();
-        let own = names(file, "camera", count)?;
+        let names = names(file, "camera", count)?;
         let modes = file.kinds("cam_mode", count)?;
         let fovs = file.vectors::<1>("cam_fovy", count)?;
         let sizes = file.vectors_of_integers::<2>("cam_resolution", count)?;
@@ -65,7 +65,7 @@ impl Robot {
                 is_fixed: modes[k] == "mjCAMLIGHT_FIXED",
             }
         };
-        Ok(own.into_iter().enumerate().map(camera).collect())
+        Ok(names.into_iter().enumerate().map(camera).collect())
     }
 }
 
