@@ -276,6 +276,19 @@ pos = [0.0, 0.0, 1.0]
 [[contact_sensor]]
 name = "touch"
 shapes = ["cube/ball"]
+
+[[camera]]
+name = "eye"
+body = "cartpole/pole"
+pos = [0.0, -1.0, 0.5]
+width = 16
+height = 8
+fov = 1.2
+every = 2
+depth_noise = [0.01, 0.002]
+
+[randomize.cameras]
+eye = { x = { uniform = [-0.1, 0.1] }, focal = { normal = [0.0, 0.1] } }
 """
 
 
