@@ -58,6 +58,10 @@ class CameraImage:
         """The field that is chosen, or None."""
         return None if self._choice.value == OFF else self._choice.value
 
+    def drop(self) -> None:
+        """Choose no image."""
+        self._choice.value = OFF
+
     def show(self, shown: Any, world: int) -> None:
         """Send the image of a world in a frame. It is hidden if none is chosen, or the frame does not have it yet."""
         field = self.field

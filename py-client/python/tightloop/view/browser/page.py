@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from tightloop.errors import TightloopError
+from tightloop.errors import ResourceError, TightloopError
 from tightloop.planning.dynamics import Dynamics
 from tightloop.view.browser.aim import Aim
 from tightloop.view.browser.display_options import DisplayOptions
@@ -104,7 +104,11 @@ class Page:
         shown = self._stream.poll(timeout)
         changed = self.options.take_changes()
         wanted = self._panel.fields | (set(CONTACT_FIELDS) if self.options.contacts != "off" else set())
-        self._stream.want(wanted)
+        try:
+            self._stream.want(wanted)
+        except ResourceError as problem:  # such as images of all worlds that exceed memory
+            self._stream.driver.problem = str(problem)
+            self._panel.drop_image()
         if shown is not None:
             self._shown = shown
         if shown is not None or changed:

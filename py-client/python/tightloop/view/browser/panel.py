@@ -126,6 +126,11 @@ class Panel:
         if self._image is not None:
             self._image.show(shown, world)
 
+    def drop_image(self) -> None:
+        """Show no image of a camera."""
+        if self._image is not None:
+            self._image.drop()
+
     def hide(self) -> None:
         """Hide the controls; a browser that is slow may still get updates of those that are removed."""
         for part in (self._text, *self._folders):
