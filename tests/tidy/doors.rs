@@ -85,11 +85,10 @@ const READS: [&str; 8] = [
 ];
 
 /// Where Python reads files itself, and why. A file that a user names is read through `files/named.py`.
-const READERS: [&str; 18] = [
+const READERS: [&str; 17] = [
     "adapters/jax/programs.py",       // a header of jaxlib
     "assets/policy.py",               // what named.py has opened
     "datasets/rerun.py",              // the file that it writes
-    "datasets/twin_file.py",          // files that it writes
     "demo/lesson.py",                 // a file of the package
     "examples/__init__.py",           // files of the package
     "examples/files/learning/log.py", // what the training itself writes

@@ -299,7 +299,7 @@ class Evaluation:
         worlds: Number of worlds: the first ones of each state.
         precision: Precision of the run.
         fields: Fields to evaluate, besides those of every frame.
-        drawn: What draws depend on: number of the first world, ``draws`` of the launch, and whether faults reset worlds.
+        drawn: What draws depend on: the first world's number, ``draws`` of the launch, and whether faults reset worlds.
 
     Raises:
         SceneError: The scene is not valid, or its files cannot be read.

@@ -116,6 +116,12 @@ CALLS: dict[str, Call] = {
             "near": "positive",
             "far": "positive",
             "every": "count",
+            "target": "triple",
+            "focal": "positive pair",
+            "center": "pair",
+            "sees": "choice",
+            "depth_noise": "noise",
+            "mujoco": "label",
             "name": "name",
         },
         width=8,
@@ -124,7 +130,14 @@ CALLS: dict[str, Call] = {
     "Scene.filter_contacts": of_scene("filter_contacts", {"a": "collidable", "b": "collidable"}, a="cube", b="cube"),
     "Scene.randomize": of_scene(
         "randomize",
-        {"joint_q": "joints", "joint_qd": "joints", "body_q": "bodies", "body_qd": "bodies", "params": "ranges"},
+        {
+            "joint_q": "joints",
+            "joint_qd": "joints",
+            "body_q": "bodies",
+            "body_qd": "bodies",
+            "params": "ranges",
+            "cameras": "bodies",
+        },
     ),
     "Scene.solver": of_scene(
         "solver",

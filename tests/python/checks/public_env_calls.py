@@ -160,6 +160,7 @@ EPISODES = {
     "worlds": "some worlds",
     "fps": "positive",
     "min_steps": "count",
+    "cameras": "optional scene",
 }
 DATASET_CALLS: dict[str, Call] = {
     "episodes": Call(lambda _: datasets.episodes, EPISODES),

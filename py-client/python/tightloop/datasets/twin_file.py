@@ -8,7 +8,7 @@ nobody changes.
 
 from __future__ import annotations
 
-import os
+import io
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,7 +30,7 @@ class TwinFile:
         self._path = path
         key = secrets.token_hex(8)
         self._names = [path.with_name(f".tightloop-{key}-{copy}{path.suffix}") for copy in range(3)]
-        self._copies = [os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666) for name in self._names[:2]]
+        self._copies = [io.FileIO(name, "x+") for name in self._names[:2]]
         #: Index of the copy of the last commit.
         self._whole = 0
         # pages since the last commit, and those of the last commit, which the other copy lacks
@@ -38,9 +38,9 @@ class TwinFile:
         self._behind: dict[int, bytearray] = {}
         self._size = self._place = 0
 
-    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
         """Move to a place, and return it."""
-        start = {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._size}[whence]
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
         self._place = start + offset
         return self._place
 
@@ -94,9 +94,9 @@ class TwinFile:
         other = 1 - self._whole
         for page, data in (self._behind | self._changed).items():
             _write_all(self._copies[other], data, page * _PAGE)
-        os.ftruncate(self._copies[other], self._size)
+        self._copies[other].truncate(self._size)
         # a rename onto a file of the same contents, from a name that is needed no more
-        os.link(self._names[other], self._names[2])
+        self._names[2].hardlink_to(self._names[other])
         self._names[2].replace(self._path)
         self._whole = other
         self._behind, self._changed = self._changed, {}
@@ -104,7 +104,7 @@ class TwinFile:
     def close(self) -> None:
         """Release both copies; the file stays as of the last commit."""
         while self._copies:
-            os.close(self._copies.pop())
+            self._copies.pop().close()
         for name in self._names:
             remove(name)
 
@@ -112,8 +112,12 @@ class TwinFile:
         """Return a page, as long as pages are."""
         if page in self._changed:
             return self._changed[page]
-        data = bytearray(os.pread(self._copies[self._whole], _PAGE, page * _PAGE))
-        return data + bytearray(_PAGE - len(data))
+        data, file = bytearray(_PAGE), self._copies[self._whole]
+        file.seek(page * _PAGE)
+        view = memoryview(data)
+        while view and (count := file.readinto(view)):
+            view = view[count:]
+        return data
 
 
 def _pages(place: int, count: int) -> Iterator[tuple[int, int, int]]:
@@ -126,8 +130,8 @@ def _pages(place: int, count: int) -> Iterator[tuple[int, int, int]]:
         place += length
 
 
-def _write_all(file: int, data: bytearray, place: int) -> None:
+def _write_all(file: io.FileIO, data: bytearray, place: int) -> None:
+    file.seek(place)
     view = memoryview(data)
     while view:
-        written = os.pwrite(file, view, place)
-        view, place = view[written:], place + written
+        view = view[file.write(view) :]

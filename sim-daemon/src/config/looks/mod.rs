@@ -55,7 +55,7 @@ pub(crate) struct Looks {
 
 impl SceneFile {
     /// What the scene of this description looks like: collisions in the order of the model's shapes, then each robot's visuals,
-    /// sites and bones; paths as in [`SceneFile::describe`].
+    /// sites and skeleton; paths as in [`SceneFile::describe`].
     pub(crate) fn looks(&self, description: &Description, base_dir: &Path) -> Looks {
         let mut looks = Looks::default();
         let mut names = description.shape_names().into_iter();

@@ -114,7 +114,7 @@ fn a_heartbeat_or_a_release_of_another_lease_is_none_of_the_present_one() {
 fn a_release_comes_before_a_request_for_the_lease_that_was_sent_after_it() {
     for releases in [0, 1] {
         with_holder("order", |host, _| {
-            // the daemon reads those of one client first, whoever was quicker
+            // the daemon reads those of one client first, in whatever order they came
             let clients = [connect(host), connect(host)];
             clients[releases].post(&Request::Release { epoch: 1 });
             clients[1 - releases].post(&Request::Acquire { pid: PIDS[1] });
@@ -170,7 +170,7 @@ fn a_command_is_carried_out_once_and_only_for_its_own_lease() {
             let refusal = frames.receive().unwrap();
             assert_eq!(refusal.is_some(), !is_carried_out, "{epoch}, {seq}");
         }
-        // a daemon that ends says so by going
+        // a daemon that ends reports it by going
         host.state.stop.store(true, Ordering::Relaxed);
         host.state.refuse(RefusalKind::Stale, "nobody waits");
         assert!(frames.receive().unwrap().is_none());
