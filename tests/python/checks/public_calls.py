@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from camera_calls import CAMERA
 from public_call import Call
 from public_env_calls import DATASET_CALLS, DATASET_LEFT, ENV_CALLS, ENV_LEFT, VIEW_CALLS, VIEW_LEFT
 from wrong_values import BALL, COMMANDS, OF_MODELS, POSE, SHAPE, START, SURFACE
@@ -105,28 +106,7 @@ CALLS: dict[str, Call] = {
             "name": "name",
         },
     ),
-    "Scene.add_camera": of_scene(
-        "add_camera",
-        POSE
-        | {
-            "width": "count",
-            "height": "count",
-            "fov": "positive",
-            "body": "body",
-            "near": "positive",
-            "far": "positive",
-            "every": "count",
-            "target": "triple",
-            "focal": "positive pair",
-            "center": "pair",
-            "sees": "choice",
-            "depth_noise": "noise",
-            "mujoco": "label",
-            "name": "name",
-        },
-        width=8,
-        height=8,
-    ),
+    "Scene.add_camera": of_scene("add_camera", POSE | CAMERA, width=8, height=8),
     "Scene.filter_contacts": of_scene("filter_contacts", {"a": "collidable", "b": "collidable"}, a="cube", b="cube"),
     "Scene.randomize": of_scene(
         "randomize",

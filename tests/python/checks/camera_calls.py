@@ -1,0 +1,18 @@
+"""Kinds of the arguments of `Scene.add_camera`, besides its pose."""
+
+CAMERA = {
+    "width": "count",
+    "height": "count",
+    "fov": "positive",
+    "body": "body",
+    "near": "positive",
+    "far": "positive",
+    "every": "count",
+    "target": "triple",
+    "focal": "positive pair",
+    "center": "pair",
+    "sees": "choice",
+    "depth_noise": "noise",
+    "mujoco": "label",
+    "name": "name",
+}
