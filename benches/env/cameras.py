@@ -83,8 +83,8 @@ def warps(python: str, scene: str, reference: Path, rounds: int) -> tuple[str, d
     """The version, and images per second by what they have."""
     side = Path(__file__).with_name("camera_warp_side.py")
     command = [python, str(side), scene, str(reference), str(WARP_WORLDS), str(rounds)]
-    told = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout.splitlines()[-1]
-    answer = json.loads(told)
+    output = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout
+    answer = json.loads(output.splitlines()[-1])
     return answer["version"], answer["rates"]
 
 

@@ -1,10 +1,10 @@
-//! Normals of shapes at points on their surfaces, for eight rays.
+//! Normals of shapes at points on their surfaces, for eight rays, and the arithmetic of eight points.
 
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::solids::Solid;
-use crate::vector::{Frame, each, three};
+use crate::vector::{Frame, Vector, each, three};
 
 /// Coordinates of eight points or directions.
 pub(crate) type Points = [F32x8; 3];
@@ -76,4 +76,19 @@ fn unit(v: Points) -> Points {
     let square = v[2].fma(v[2], v[1].fma(v[1], v[0] * v[0]));
     let scale = F32x8::k(1.0).div(square.sqrt());
     three!(k => v[k] * scale)
+}
+
+/// Products of eight vectors with one.
+#[inline(always)]
+pub(crate) fn products(a: &Points, b: Vector) -> F32x8 {
+    a[2].fma(
+        F32x8::k(b[2]),
+        a[1].fma(F32x8::k(b[1]), a[0] * F32x8::k(b[0])),
+    )
+}
+
+/// Squares of the lengths of eight vectors.
+#[inline(always)]
+pub(crate) fn squares(a: &Points) -> F32x8 {
+    a[2].fma(a[2], a[1].fma(a[1], a[0] * a[0]))
 }

@@ -5,11 +5,11 @@
 use sim_physics::lane::Num;
 use sim_physics::lane::simd::F32x8;
 
+use crate::normals::{Points, products, squares};
 use crate::solids::Solid;
 use crate::vector::{Frame, Vector, dot, three};
 
 type Mask = <F32x8 as Num>::Mask;
-type Points = [F32x8; 3];
 
 /// A square of the sine of an angle below which a ray is along an axis [–].
 const ALONG: f32 = 1e-12;
@@ -152,17 +152,4 @@ fn cylinder(radius: f32, half: f32, o: &Points, d: Vector) -> Mask {
 fn capsule_holds(radius: f32, half: f32, o: &Points) -> Mask {
     let z = o[2] - o[2].max(F32x8::k(-half)).min(F32x8::k(half));
     squares(&[o[0], o[1], z]).lt(F32x8::k(radius * radius))
-}
-
-#[inline(always)]
-fn products(a: &Points, b: Vector) -> F32x8 {
-    a[2].fma(
-        F32x8::k(b[2]),
-        a[1].fma(F32x8::k(b[1]), a[0] * F32x8::k(b[0])),
-    )
-}
-
-#[inline(always)]
-fn squares(a: &Points) -> F32x8 {
-    a[2].fma(a[2], a[1].fma(a[1], a[0] * a[0]))
 }

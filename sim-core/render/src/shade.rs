@@ -5,7 +5,7 @@ use sim_physics::lane::{Lane, Num};
 
 use crate::light::{AMBIENT, BRIGHT, FILL, FILLED, HIGH, HORIZON, SKY, UPWARD};
 use crate::lit::Lit;
-use crate::normals::{Points, mask, turned, turned_back};
+use crate::normals::{Points, mask, products, squares, turned, turned_back};
 use crate::scene::{Scene, Surface};
 use crate::shadow::Casters;
 use crate::solids::Solid;
@@ -250,17 +250,4 @@ fn bytes(shares: &Points) -> [[u8; 3]; EDGE] {
             .store(&mut lanes[k]);
     }
     each!(lane in 0 1 2 3 4 5 6 7 => three!(k => lanes[k][lane].to_bits() as u8))
-}
-
-#[inline(always)]
-fn products(a: &Points, b: Vector) -> F32x8 {
-    a[2].fma(
-        F32x8::k(b[2]),
-        a[1].fma(F32x8::k(b[1]), a[0] * F32x8::k(b[0])),
-    )
-}
-
-#[inline(always)]
-fn squares(a: &Points) -> F32x8 {
-    a[2].fma(a[2], a[1].fma(a[1], a[0] * a[0]))
 }

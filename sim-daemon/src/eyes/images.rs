@@ -111,6 +111,12 @@ impl Images {
         self.arena_bytes
     }
 
+    /// Whether a camera repeats images.
+    pub(crate) fn repeat(&self) -> bool {
+        let seen = self.seen.as_ref();
+        seen.is_some_and(|seen| seen.sight.eyes.iter().any(|eye| eye.every > 1))
+    }
+
     /// What cannot be seen, a sentence each.
     pub(crate) fn notes(&self) -> &[String] {
         let seen = self.seen.as_ref();

@@ -67,8 +67,8 @@ impl Part {
     ) {
         for world in self.worlds.clone() {
             state.frames(world, &mut self.frames);
+            let moment = state.moment(world);
             for (place, eye) in sight.eyes.iter().enumerate() {
-                let moment = state.moment(world);
                 if eye.every == 1 {
                     self.draw_image(sight, eye, fields, (world, moment), images);
                     continue;

@@ -63,12 +63,12 @@ fn serve(
                     }
                     None => apply(simulation, host, &mut mask, &mut ik),
                 };
-                if host.inbox().op() == Op::Restore {
+                if applied.is_ok() && host.inbox().op() == Op::Restore {
                     eyes.forget();
-                }
-                // its file may be gone when the recording is replayed
-                if host.is_recorded() && applied.is_ok() && host.inbox().op() == Op::Restore {
-                    record_state(simulation, host, true);
+                    // its file may be gone when the recording is replayed
+                    if host.is_recorded() {
+                        record_state(simulation, host, true);
+                    }
                 }
                 if let (Ok(_), Some(refusal)) = (&applied, lost(simulation)) {
                     applied = Err(refusal);
@@ -131,9 +131,9 @@ fn serve(
             // handled above
             Next::LeaseEnded => {}
             Next::Record => {
-                // a replay has the state, and no images that came before
+                // a replay has the state, and no images that came before; other recordings must forget them, too
                 eyes.forget();
-                record_state(simulation, host, false);
+                record_state(simulation, host, eyes.images().repeat());
             }
             Next::End => return Ok(()),
         }

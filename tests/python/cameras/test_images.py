@@ -303,6 +303,26 @@ def test_a_recording_that_begins_between_two_images_is_replayed(tmp_path: Path) 
     subprocess.run([sys.executable, "-m", "tightloop", "replay", file], check=True)
 
 
+def test_recordings_that_begin_at_different_steps_are_both_replayed(tmp_path: Path) -> None:
+    scene, camera = tumbling(every=5)
+    first, second = tmp_path / "first.tlrec", tmp_path / "second.tlrec"
+    with tl.launch(tl.Scene(), worlds=2) as other:
+        of_another_scene = other.snapshot()
+    with tl.launch(scene, worlds=2, fields=("joint_q", *camera.fields)) as sim:
+        sim.reset(seed=3)
+        with sim.record(first):
+            for _ in range(7):
+                sim.step()
+            with sim.record(second):
+                for _ in range(6):
+                    sim.step()
+                with pytest.raises(tl.TightloopError):
+                    sim.restore(of_another_scene)
+                sim.step()
+    for file in (first, second):
+        subprocess.run([sys.executable, "-m", "tightloop", "replay", file], check=True)
+
+
 def test_a_fault_ends_an_episode_with_its_own_image_and_the_next_one_has_another() -> None:
     scene = tl.Scene(dt=1 / 480, substeps=4)
     scene.add_ground()
