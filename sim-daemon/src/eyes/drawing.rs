@@ -86,7 +86,7 @@ impl Eyes {
         let count = parts(threads, worlds);
         let parts = (0..count).map(|part| {
             let worlds = part * worlds / count..(part + 1) * worlds / count;
-            Part::new(&seen.sight, eyes.images.fields(), worlds)
+            Part::new(seen, &eyes.images, worlds)
         });
         eyes.parts = parts.collect();
         let depends = |eye: &Eye| eye.chance.is_random() || eye.every > 1;
@@ -106,8 +106,8 @@ impl Eyes {
         self.parts.iter_mut().for_each(Part::forget);
     }
 
-    /// Draws the images of a frame, which has the arrays of this simulation already. Later frames repeat them if it `keeps`
-    /// them. Without cameras it does nothing.
+    /// Draws the images of a frame, which has the arrays of this simulation already. Later frames may repeat them if it
+    /// `keeps` them, which those of [`Images::unkept`] are not. Without cameras it does nothing.
     ///
     /// # Panics
     /// The arena is smaller than [`Images::arena_bytes`].

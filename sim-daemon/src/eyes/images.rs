@@ -16,6 +16,8 @@ pub(crate) struct Images {
     pub(super) seen: Option<Seen>,
     fields: Vec<ImageField>,
     arena_bytes: usize,
+    /// Whether images are kept for later frames.
+    pub(super) keeps: bool,
 }
 
 /// What images are drawn from.
@@ -32,6 +34,13 @@ pub(super) struct Seen {
     pub(super) statuses: Slot,
 }
 
+impl Seen {
+    /// Size of the poses of a world's bodies [bytes].
+    pub(super) fn poses_bytes(&self) -> usize {
+        self.bodies.bytes / self.bodies.shape[0]
+    }
+}
+
 impl Images {
     /// No images.
     pub(crate) fn none(layout: &Layout) -> Images {
@@ -39,6 +48,15 @@ impl Images {
             seen: None,
             fields: Vec::new(),
             arena_bytes: layout.bytes,
+            keeps: true,
+        }
+    }
+
+    /// The same, of frames that are not kept: each is drawn whole.
+    pub(crate) fn unkept(self) -> Images {
+        Images {
+            keeps: false,
+            ..self
         }
     }
 
@@ -123,18 +141,15 @@ impl Images {
         seen.map_or(&[], |seen| &seen.sight.notes)
     }
 
-    /// Memory that drawing takes besides on so many threads: the last images of cameras that do not draw in each frame, and
-    /// depths of those without a field of them [bytes].
+    /// Memory that drawing takes besides on so many threads: the last images with the poses that they show, and depths of
+    /// cameras without a field of them [bytes].
     pub(crate) fn memory_bytes(&self, threads: usize) -> u64 {
         let Some(seen) = &self.seen else { return 0 };
-        let repeats = seen.sight.eyes.iter().filter(|eye| eye.every > 1);
-        let of_camera = |number| {
-            self.fields
-                .iter()
-                .filter(move |field| field.camera == number)
+        let images = self.fields.iter().map(|field| field.bytes() as u64);
+        let kept = match self.keeps {
+            true => images.sum::<u64>() + seen.bodies.bytes as u64,
+            false => 0,
         };
-        let images = repeats.flat_map(|eye| of_camera(eye.number));
-        let kept: u64 = images.map(|field| field.bytes() as u64).sum();
         let spare = spare_pixels(&seen.sight, &self.fields) * size_of::<f32>();
         kept.saturating_add((spare * parts(threads, seen.steps.shape[0])) as u64)
     }

@@ -46,6 +46,11 @@ impl State<'_> {
         }
     }
 
+    /// The poses of a world's bodies, as they lie in the frame.
+    pub(super) fn poses(&self, world: usize) -> &[u8] {
+        self.row(self.bodies, world)
+    }
+
     /// Frames of a world's bodies.
     pub(super) fn frames(&self, world: usize, to: &mut Vec<Frame>) {
         to.clear();

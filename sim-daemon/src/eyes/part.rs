@@ -6,7 +6,7 @@ use sim_render::{Frame, Image, Scratch};
 
 use super::chance::Moment;
 use super::fields::{ImageField, Plane};
-use super::images::spare_pixels;
+use super::images::{Images, Seen, spare_pixels};
 use super::memory::{Memory, State};
 use super::sight::{Eye, Sight};
 
@@ -19,11 +19,16 @@ pub(super) struct Part {
     /// Depths of images without a field of depths.
     spare: Vec<f32>,
     repeats: Vec<Repeat>,
+    /// What the frame before showed of each world; none before the first one.
+    shown: Vec<Option<Moment>>,
+    /// Poses of its bodies then, one world after the other.
+    poses: Vec<u8>,
 }
 
-/// The last images of a camera that draws none in some frames.
+/// The last images of a camera, which later frames repeat.
 struct Repeat {
-    /// When each world's was drawn; none before the first one, and where the next frame has a new one.
+    /// When each world's was drawn, of a camera that draws none in some frames; none before the first one, and where the
+    /// next frame has a new one.
     drawn: Vec<Option<Moment>>,
     /// Images of each world, one after the other.
     bytes: Vec<u8>,
@@ -31,19 +36,22 @@ struct Repeat {
 }
 
 impl Part {
-    pub(super) fn new(sight: &Sight, fields: &[ImageField], worlds: Range<usize>) -> Part {
+    pub(super) fn new(seen: &Seen, images: &Images, worlds: Range<usize>) -> Part {
+        let (sight, fields) = (&seen.sight, images.fields());
+        let kept = if images.keeps { worlds.len() } else { 0 };
         let repeats = sight.eyes.iter().map(|eye| {
             let seen = fields.iter().filter(|field| field.camera == eye.number);
             let of_world = seen.map(|field| field.bytes() / field.shape[0]).sum();
-            let kept = if eye.every > 1 { worlds.len() } else { 0 };
             Repeat {
-                drawn: vec![None; kept],
+                drawn: vec![None; if eye.every > 1 { kept } else { 0 }],
                 bytes: vec![0; kept * of_world],
                 of_world,
             }
         });
         Part {
             repeats: repeats.collect(),
+            shown: vec![None; kept],
+            poses: vec![0; kept * seen.poses_bytes()],
             worlds,
             scratch: Scratch::default(),
             frames: Vec::with_capacity(sight.segments.len()),
@@ -55,8 +63,11 @@ impl Part {
     pub(super) fn forget(&mut self) {
         let repeats = self.repeats.iter_mut();
         repeats.for_each(|repeat| repeat.drawn.fill(None));
+        self.shown.fill(None);
     }
 
+    /// Draws the images of a frame. Where a world is as in the frame before, such as one that goes on while others are
+    /// reset, its images are those of that frame.
     pub(super) fn draw(
         &mut self,
         sight: &Sight,
@@ -68,21 +79,22 @@ impl Part {
         for world in self.worlds.clone() {
             state.frames(world, &mut self.frames);
             let moment = state.moment(world);
+            let place_in_part = world - self.worlds.start;
+            let is_as_before = self.is_as_before(place_in_part, moment, state.poses(world), keeps);
             for (place, eye) in sight.eyes.iter().enumerate() {
-                if eye.every == 1 {
-                    self.draw_image(sight, eye, fields, (world, moment), images);
-                    continue;
-                }
-                let place_in_part = world - self.worlds.start;
-                let repeat = &self.repeats[place];
-                let is_due = repeat.drawn[place_in_part]
-                    .is_none_or(|then| !moment.repeats(&then, eye.every));
+                let drawn = self.repeats[place].drawn.get_mut(place_in_part);
+                let is_due = match &drawn {
+                    Some(drawn) => drawn.is_none_or(|then| !moment.repeats(&then, eye.every)),
+                    None => !is_as_before,
+                };
                 if is_due {
+                    if keeps && let Some(drawn) = drawn {
+                        *drawn = Some(moment);
+                    }
                     self.draw_image(sight, eye, fields, (world, moment), images);
                     if !keeps {
                         continue;
                     }
-                    self.repeats[place].drawn[place_in_part] = Some(moment);
                 }
                 let mine = fields.iter().filter(|field| field.camera == eye.number);
                 self.repeats[place].exchange(
@@ -95,6 +107,20 @@ impl Part {
                 );
             }
         }
+    }
+
+    /// Whether a frame shows a world as the last one that was kept. Notes what it shows if it is kept.
+    fn is_as_before(&mut self, world: usize, moment: Moment, poses: &[u8], keeps: bool) -> bool {
+        if self.shown.is_empty() {
+            return false;
+        }
+        let known = &mut self.poses[world * poses.len()..][..poses.len()];
+        let is_as_before = self.shown[world] == Some(moment) && known == poses;
+        if keeps && !is_as_before {
+            self.shown[world] = Some(moment);
+            known.copy_from_slice(poses);
+        }
+        is_as_before
     }
 
     fn draw_image(

@@ -59,7 +59,7 @@ impl Evaluation {
             compiles: false,
             ..Options::default()
         };
-        let images = Images::new(sight, &Simulation::layout_of(&model, &options))?;
+        let images = Images::new(sight, &Simulation::layout_of(&model, &options))?.unkept();
         let needed = (images.arena_bytes() as u64)
             .saturating_add(images.memory_bytes(1))
             .saturating_add(Simulation::memory_of(&model, &options));

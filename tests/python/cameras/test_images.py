@@ -169,6 +169,33 @@ def test_a_camera_draws_at_its_rate_and_repeats_the_last_image_in_between() -> N
         assert np.array_equal(again[0][0][0], shown[0][8][0][0])
 
 
+def test_images_of_worlds_that_do_not_change_stay_and_the_others_are_new() -> None:
+    scene, camera = tumbling()
+    fields = ("joint_q", "joint_qd", *camera.fields)
+
+    def differ(one: tuple[NDArray[Any], ...], other: tuple[NDArray[Any], ...]) -> list[bool]:
+        return [
+            any(a[world].tobytes() != b[world].tobytes() for a, b in zip(one, other, strict=True)) for world in range(3)
+        ]
+
+    with tl.launch(scene, worlds=3, fields=fields) as sim, tl.launch(scene, worlds=3, fields=fields) as plain:
+        begun = images(sim.reset(seed=1))
+        before = [images(sim.step()) for _ in range(8)][-1]
+        after = images(sim.reset(mask=np.array([False, True, False])))
+        assert differ(before, after) == [False, True, False]
+        assert differ(begun, before) == [True, True, True]
+        # a world that is written to is seen anew although its step is the same
+        written = sim.forward().joint_q.copy()
+        written[2] += 0.1
+        frame = sim.write(joint_q=written)
+        moved = images(frame)
+        assert differ(after, moved) == [False, False, True]
+        # the same states without anything before them
+        plain.reset(seed=1)
+        alone = images(plain.write(joint_q=written, joint_qd=frame.joint_qd))
+        assert differ(alone, moved) == [False, False, False]
+
+
 def test_labels_are_places_in_the_list_of_segments() -> None:
     scene, camera = tumbling()
     with tl.launch(scene, worlds=1, fields=("joint_q", camera.segmentation)) as sim:
