@@ -76,6 +76,36 @@ def start_apart(
     return subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=stderr, start_new_session=True)
 
 
+def write_at_once(pipe: IO[bytes], data: bytes) -> int:
+    """Write as much to a pipe as it takes now, and return how many bytes that is.
+
+    Args:
+        pipe: The pipe, which nobody else writes to.
+        data: Bytes to write.
+
+    Raises:
+        OSError: The pipe has no reader any more.
+    """
+    if sys.platform == "win32" and sys.version_info < (3, 12):
+        return len(data)  # this Python cannot write without waiting there, so it writes nothing
+    os.set_blocking(pipe.fileno(), False)
+    try:
+        return os.write(pipe.fileno(), data)
+    except BlockingIOError:
+        return 0
+
+
+def take_pipes() -> tuple[IO[str], IO[str]]:
+    """Return standard input and output for this process alone: those that it starts have none."""
+    taken = os.fdopen(os.dup(0), "r"), os.fdopen(os.dup(1), "w")
+    sys.stdout.flush()
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1):
+        os.dup2(nothing, number)
+    os.close(nothing)
+    return taken
+
+
 def device_of_processes() -> int | None:
     """Return the device of files that show processes and the kernel, which are no files to read; None without them."""
     try:

@@ -55,6 +55,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--open", action="store_true", help="open the page in this machine's browser")
     made.add_argument("--parent", type=int, help=argparse.SUPPRESS)
+    # whether the parent steps the worlds, and says what it gets for it
+    made.add_argument("--linked", action="store_true", help=argparse.SUPPRESS)
     return made
 
 
@@ -66,12 +68,14 @@ def main(arguments: list[str]) -> int:
         signal.signal(number, lambda *_: stopped.set())
     try:
         dependencies.check("viser")
+        from tightloop.view.browser.loop_link import LoopLink
         from tightloop.view.browser.server import Server
 
         # the simulation goes first where there are not enough cores for both
         system.give_way()
         names = given.allow_host
-        server = Server(given.target, host=given.host, port=given.port, worlds=given.worlds, names=names)
+        place = {"host": given.host, "port": given.port, "names": names}
+        server = Server(given.target, **place, worlds=given.worlds)
     except (TightloopError, OSError) as problem:
         if given.parent is None:
             print(printable(f"tightloop: {problem}"), file=sys.stderr)
@@ -82,6 +86,9 @@ def main(arguments: list[str]) -> int:
         if server.port != given.port:
             print(f"tightloop: port {given.port} is taken; the page is at {server.port}", file=sys.stderr, flush=True)
         print(server.url, flush=True)
+        if given.linked:
+            # before a browser is started, which would keep the pipes open
+            server.link = LoopLink(system.take_pipes())
         if given.open:
             webbrowser.open(server.url_once())
         server.run(stopped, given.parent)

@@ -17,6 +17,7 @@ from tightloop.view.browser.drag_spring import DragSpring, drag_spring
 from tightloop.view.browser.frame_stream import FEW_WORLDS, FrameStream
 from tightloop.view.browser.joints import Joint, at_targets, joints
 from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.loop_link import LoopLink
 from tightloop.view.browser.overlay import Overlay
 from tightloop.view.browser.panel import Panel
 from tightloop.view.browser.stage import add_stage
@@ -43,9 +44,12 @@ class Page:
         server: Server of the page, without the handles of another stream.
         stream: Frames to show.
         first: First frame.
+        link: As of `Panel`.
     """
 
-    def __init__(self, server: viser.ViserServer, stream: FrameStream, first: Any) -> None:
+    def __init__(
+        self, server: viser.ViserServer, stream: FrameStream, first: Any, *, link: LoopLink | None = None
+    ) -> None:
         info = stream.info
         self.options = DisplayOptions()
         self._server = server
@@ -68,9 +72,8 @@ class Page:
         self.options.follow = self._preset == "follow"
         self._aims: dict[int, Aim] = {}
         self._kept_at, self._at_rest = 0.0, False
-        self._panel = Panel(
-            server, stream, self.options, driven=self._driven, aim=self.aim, notes=notes, preset=self._preset
-        )
+        chosen = {"driven": self._driven, "aim": self.aim, "notes": notes, "preset": self._preset}
+        self._panel = Panel(server, stream, self.options, **chosen, link=link)
         self._world_meshes.on_click(lambda world, _: self._panel.follow(world))
         if isinstance(stream.driver, LiveDriver) and stream.driver.can_push and self._dynamics is not None:
             self._world_meshes.on_drag(self._drag)

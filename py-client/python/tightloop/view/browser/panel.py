@@ -19,6 +19,8 @@ from tightloop.view.browser.display_options import DisplayOptions
 from tightloop.view.browser.frame_stream import FrameStream
 from tightloop.view.browser.joints import Joint
 from tightloop.view.browser.live_driver import LiveDriver
+from tightloop.view.browser.loop_link import LoopLink
+from tightloop.view.browser.loop_panel import LoopPanel
 from tightloop.view.browser.player import Player
 from tightloop.view.browser.plots import PLOTS_MAX, Plot, choices
 from tightloop.view.browser.sliders import Sliders
@@ -44,6 +46,7 @@ class Panel:
         aim: Called with the name of a chosen camera preset.
         notes: What users should know about the scene's options.
         preset: Camera preset at the start.
+        link: What the loop that steps the worlds says; None if it says nothing.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class Panel:
         aim: Callable[[str], None],
         notes: list[str],
         preset: str = "three-quarter",
+        link: LoopLink | None = None,
     ) -> None:
         self._gui = server.gui
         self._info = info = stream.info
@@ -69,6 +73,7 @@ class Panel:
         self._gui.set_panel_label(f"tightloop · {info['name']}")
         self._text = self._gui.add_markdown("")
         self._folders: list[viser.GuiFolderHandle] = []
+        self._loop = None if link is None else LoopPanel(self._gui, link)
         with self._folder("Time"):
             self._add_time()
         with self._folder("Look"):
@@ -125,6 +130,8 @@ class Panel:
             plot.draw()
         if self._image is not None:
             self._image.show(shown, world)
+        if self._loop is not None:
+            self._loop.update(world)
 
     def drop_image(self) -> None:
         """Show no image of a camera."""
@@ -135,6 +142,8 @@ class Panel:
         """Hide the controls; a browser that is slow may still get updates of those that are removed."""
         for part in (self._text, *self._folders):
             part.visible = False
+        if self._loop is not None:
+            self._loop.hide()
 
     def follow(self, world: int) -> None:
         """Follow another world, for example after a click on it."""
@@ -210,7 +219,7 @@ class Panel:
 
         def choose_world(_: Any) -> None:
             options.choose(world=min(world.value, self._worlds - 1))
-            for plot in self._plots:
+            for plot in (*self._plots, *([] if self._loop is None else [self._loop])):
                 plot.clear()
 
         world.on_update(choose_world)

@@ -15,6 +15,7 @@ from tightloop.errors import DaemonLost, TightloopError, UnknownDaemon
 from tightloop.view.browser import guarded_server
 from tightloop.view.browser.frame_stream import FEW_WORLDS, FrameStream, open_stream
 from tightloop.view.browser.gate import Gate
+from tightloop.view.browser.loop_link import LoopLink
 from tightloop.view.browser.page import Page
 
 # Least time between frames: with few worlds all 60 frames per second are shown, with many worlds every other one.
@@ -33,6 +34,7 @@ class Server:
     Attributes:
         url: Address of the page, with the token that opens it.
         port: Port of the page: the requested one, or the next free one.
+        link: As of `Panel`, for pages to come.
 
     Args:
         target: Name of a daemon, or path of a recording.
@@ -45,8 +47,17 @@ class Server:
         UnknownDaemon: No daemon of that name is running; the message lists those that are.
     """
 
-    def __init__(self, target: str, *, host: str, port: int, worlds: int, names: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        target: str,
+        *,
+        host: str,
+        port: int,
+        worlds: int,
+        names: Sequence[str] = (),
+    ) -> None:
         self._target = target
+        self.link: LoopLink | None = None
         self._worlds = worlds
         self._stream: FrameStream | None = open_stream(target, worlds)
         self._page: Page | None = None
@@ -108,7 +119,7 @@ class Server:
         if self._page is None:
             first = self._stream.poll(_WAIT_SECONDS)
             if first is not None:
-                self._page = Page(self._viser, self._stream, first)
+                self._page = Page(self._viser, self._stream, first, link=self.link)
                 for client in self._viser.get_clients().values():
                     self._page.aim_client(client)
             return None
