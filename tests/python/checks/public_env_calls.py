@@ -21,6 +21,7 @@ ENV_CALLS: dict[str, Call] = {
             "threads": "count",
             "max_episode_steps": "steps",
             "on_nan": "choice",
+            "dict_observations": "flag",
             "daemon": "label",
             "first_env": "index",
             "render_mode": "choice",
@@ -79,7 +80,11 @@ ENV_CALLS: dict[str, Call] = {
             "history": "count",
         },
         {"name": "angle", "low": -1.0, "high": 1.0},
-        {"source": "terms, which planning/test_policy_rollout.py tries"},
+        {
+            "source": "terms, which planning/test_policy_rollout.py tries",
+            "shape": "lengths, which cameras/test_dict_observations.py tries",
+            "delay": "steps, which env/test_delayed_parts.py tries",
+        },
     ),
     "Push": Call(
         lambda _: env.Push,

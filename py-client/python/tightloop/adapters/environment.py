@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from gymnasium.spaces import Dict
 from gymnasium.vector import AutoresetMode
 
 from tightloop.adapters.spread import SpreadVectorEnv
@@ -50,7 +51,14 @@ def set_torch_threads(torch: Any, threads: int | None, device: str = "cpu") -> N
         torch.set_num_threads(count)
 
 
-def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode, options: dict[str, Any]) -> Any:
+def adapted_environment(
+    given: Given,
+    num_envs: int | None,
+    mode: AutoresetMode,
+    options: dict[str, Any],
+    *,
+    takes_dicts: bool = False,
+) -> Any:
     """Return an environment with an autoreset mode: the given one, or a new one of the given task.
 
     Args:
@@ -58,10 +66,15 @@ def adapted_environment(given: Given, num_envs: int | None, mode: AutoresetMode,
         num_envs: Number of worlds of a new environment.
         mode: Autoreset mode that the library expects.
         options: Further arguments of `VectorEnv` for a new environment.
+        takes_dicts: Whether the adapter takes observations that are dicts.
 
     Raises:
-        ArgumentError: The environment has another mode, or arguments for a new one were given too.
+        ArgumentError: The environment has another mode or observations that the adapter does not take, or arguments for
+            a new one were given too.
     """
+    has_dicts = isinstance(getattr(given, "single_observation_space", None), Dict) or options.get("dict_observations")
+    if has_dicts and not takes_dicts:
+        raise ArgumentError("dict_observations: this adapter takes observations that are one array; leave it out")
     if not isinstance(given, VectorEnv | SpreadVectorEnv):
         if "autoreset_mode" in options or "copy" in options:
             raise ArgumentError("autoreset_mode and copy: the adapter chooses them, leave them out")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tightloop.adapters.environment import Given, adapted_environment, library, set_torch_threads
 from tightloop.checks.signatures import checked_calls
+from tightloop.env.evaluation.step_buffers import Observations
 from tightloop.errors import ArgumentError
 
 vec_env = library("stable_baselines3.common.vec_env", install="stable-baselines3")
@@ -29,6 +30,7 @@ class Sb3VecEnv(vec_env.VecEnv):
 
     ``infos[i]["terminal_observation"]`` is the last observation of an episode. ``infos[i]["TimeLimit.truncated"]`` says
     whether the time limit ended it, and ``infos[i]["is_success"]`` whether it ended in success. All arrays are copies.
+    With ``dict_observations=True`` they are of a ``"MultiInputPolicy"``, which takes uint8 images by convolutions.
 
     Attributes:
         env: The `VectorEnv`.
@@ -50,14 +52,14 @@ class Sb3VecEnv(vec_env.VecEnv):
             ArgumentError: The environment has another autoreset mode, or ``torch_threads`` is below 1.
         """
         set_torch_threads(torch, torch_threads)
-        self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options)
+        self.env = adapted_environment(env, num_envs, AutoresetMode.SAME_STEP, options, takes_dicts=True)
         super().__init__(self.env.num_envs, self.env.single_observation_space, self.env.single_action_space)
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> Observations:
         """Start episodes in all worlds, with the seeds of `seed` if it was called.
 
         Returns:
-            Observations, shape ``(num_envs, size)``.
+            Observations, shape ``(num_envs, size)``, or a dict of arrays.
 
         Raises:
             ArgumentError: `set_options` was called with options.
@@ -68,27 +70,27 @@ class Sb3VecEnv(vec_env.VecEnv):
         seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
         obs, _ = self.env.reset(seed=seeds)
         self._reset_seeds()
-        return obs.copy()
+        return _copied(obs)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Send actions, shape ``(num_envs, actions)``, and return at once; `step_wait` returns the results."""
         self.env.send(actions)
 
-    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Observations, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Wait for observations, rewards, ends and infos, worlds first."""
         obs, reward, terminated, truncated, infos = self.env.recv()
         done = terminated | truncated
         news: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
             rows = np.flatnonzero(done)
-            last, late = infos["final_obs"][rows], truncated[rows] & ~terminated[rows]
+            last, late = infos["final_obs"], truncated[rows] & ~terminated[rows]
             success, known = (infos["final_info"].get(name) for name in ("success", "_success"))
             for row, world in enumerate(rows.tolist()):
-                news[world] = {"terminal_observation": last[row], "TimeLimit.truncated": bool(late[row])}
+                news[world] = {"terminal_observation": _of_world(last, world), "TimeLimit.truncated": bool(late[row])}
                 # nothing is known of episodes that ended since their machine was lost
                 if success is not None and known[world]:
                     news[world]["is_success"] = bool(success[world])
-        return obs.copy(), reward.copy(), done, news
+        return _copied(obs), reward.copy(), done, news
 
     def close(self) -> None:
         """End the simulation."""
@@ -123,3 +125,12 @@ class Sb3VecEnv(vec_env.VecEnv):
     def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
         """Return False for each world: `VecMonitor` and the like wrap this object, not single worlds."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _copied(obs: Observations) -> Observations:
+    return {name: array.copy() for name, array in obs.items()} if isinstance(obs, dict) else obs.copy()
+
+
+def _of_world(obs: Observations, world: int) -> Observations:
+    """Return a copy of a world's observation."""
+    return {name: array[world].copy() for name, array in obs.items()} if isinstance(obs, dict) else obs[world].copy()

@@ -20,7 +20,7 @@ from tightloop.checks.signatures import checked_calls
 from tightloop.env.episodes.episodes import Episodes, check_seeds
 from tightloop.env.episodes.reset_arguments import autoreset_mode_of, reset_mask
 from tightloop.env.episodes.starts import Starts
-from tightloop.env.evaluation.step_buffers import BufferRing, StepBuffers
+from tightloop.env.evaluation.step_buffers import BufferRing, StepBuffers, aligned
 from tightloop.env.registry import make_task
 from tightloop.env.task import Task, episode_steps
 from tightloop.env.vector import Step
@@ -86,6 +86,8 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         slots = checks.integer("slots", slots, least=2, error=ArgumentError)
         first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
         copy = checks.flag("copy", copy, error=ArgumentError)
+        if env_options.get("dict_observations"):
+            raise ArgumentError("dict_observations: observations of several processes are one array; leave it out")
         self.task = make_task(task, task_options, type(self))
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.max_episode_steps = episode_steps(self.task, max_episode_steps)
@@ -119,9 +121,10 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
         self.single_observation_space, self.single_action_space = info.observation_space, info.action_space
         self.observation_space = batch_space(info.observation_space, num_envs)
         self.action_space = batch_space(info.action_space, num_envs)
-        size, dtype = info.observation_space.shape[0], self.task.dtype
-        self._ring = None if copy else BufferRing(num_envs, size, slots, dtype)
-        self._last_obs = np.zeros((num_envs, size), dtype)
+        shape, dtype = info.observation_space.shape, self.task.dtype
+        self._empty = lambda worlds: aligned((worlds, *shape), dtype)
+        self._ring = None if copy else BufferRing(num_envs, self._empty, slots, dtype)
+        self._last_obs = np.zeros((num_envs, *shape), dtype)
 
     @property
     def seeds(self) -> NDArray[np.uint64]:
@@ -362,7 +365,7 @@ class SpreadVectorEnv(GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[An
 
     def _next_buffers(self) -> StepBuffers:
         if self._ring is None:
-            return StepBuffers(self.num_envs, self._last_obs.shape[1], self.task.dtype)
+            return StepBuffers(self.num_envs, self._empty, self.task.dtype)
         return self._ring.next()
 
     def _drop(self) -> None:

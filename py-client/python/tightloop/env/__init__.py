@@ -26,9 +26,10 @@ from tightloop.env.groups import make_groups
 from tightloop.env.metadata import policy_metadata
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
+from tightloop.env.observed import Observed
 from tightloop.env.registration import register
 from tightloop.env.single import Env
-from tightloop.env.task import Observed, Task, Worlds
+from tightloop.env.task import Task, Worlds
 from tightloop.env.vector import VectorEnv
 
 __all__ = [

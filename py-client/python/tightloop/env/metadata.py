@@ -18,8 +18,9 @@ import tightloop as tl
 from tightloop.env.commands import Commands
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
+from tightloop.env.observed import Observed
 from tightloop.env.registry import controls_of, name_of
-from tightloop.env.task import Observed, Task, observed_parts
+from tightloop.env.task import Task, observed_parts
 from tightloop.env.task_checks import scene_of
 from tightloop.env.vector import VectorEnv
 from tightloop.errors import ArgumentError
@@ -52,8 +53,9 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
     # the robot's name says nothing where there is only one
     robots = [*scene.robots, *scene.models]
     alone = f"{robots[0]}/" if len(robots) == 1 else ""
-    parts, seen, space = observed_parts(task), envs.single_observation_space, envs.single_action_space
-    assert isinstance(seen, Box) and isinstance(space, Box)
+    parts, space = observed_parts(task), envs.single_action_space
+    assert isinstance(space, Box)
+    low, high = (np.concatenate([np.tile(part.bounds[end], part.history) for part in parts]) for end in (0, 1))
     facts: dict[str, Any] = {
         "task": name_of(task),
         "tightloop_version": tl.__version__,
@@ -62,10 +64,11 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "control_dt": envs.control_dt,
         "observation_names": [part.name for part in parts],
         "observation_sizes": [part.size for part in parts],
+        "observation_shapes": ["x".join(map(str, part.shape or (part.size,))) for part in parts],
         "observation_history": [part.history for part in parts],
         "observation_units": [part.unit for part in parts],
-        "observation_low": seen.low,
-        "observation_high": seen.high,
+        "observation_low": low.astype(task.dtype),
+        "observation_high": high.astype(task.dtype),
         "action_names": [name.removeprefix(alone) for name in _joined(controls, "value_names")],
         "action_types": [type(control).__name__ for control in controls for _ in range(control.size)],
         "action_scale": _joined(controls, "scales"),

@@ -15,6 +15,7 @@ EPISODE_STEPS = {
     "FrankaReach": 360,
     "FrankaPushCube": 50,
     "FrankaPickCube": 50,
+    "FrankaPickCubeDepth": 50,
     "FrankaLift": 250,
     "QuadrupedVelocityFlat": 1000,
     "QuadrupedVelocityRough": 1000,

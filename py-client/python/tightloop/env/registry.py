@@ -23,6 +23,7 @@ TASKS = {
     "FrankaReach": "tightloop.tasks.reach:FrankaReach",
     "FrankaPushCube": "tightloop.tasks.push_cube:FrankaPushCube",
     "FrankaPickCube": "tightloop.tasks.pick_cube:FrankaPickCube",
+    "FrankaPickCubeDepth": "tightloop.tasks.pick_cube_depth:FrankaPickCubeDepth",
     "FrankaLift": "tightloop.tasks.lift:FrankaLift",
     "QuadrupedVelocityFlat": "tightloop.tasks.quadruped:QuadrupedVelocityFlat",
     "QuadrupedVelocityRough": "tightloop.tasks.quadruped_rough:QuadrupedVelocityRough",

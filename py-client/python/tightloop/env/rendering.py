@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tightloop.errors import ArgumentError, CommandRefused
 
 if TYPE_CHECKING:
     from tightloop.sim.sim import Sim
+    from tightloop.sim.viewer_process import Viewer
     from tightloop.view.picture import Picture
 
 #: Gymnasium's render modes: a page in the browser, and pictures.
@@ -40,6 +42,9 @@ def marks(task: Task, goal: NDArray[Any]) -> dict[str, Any] | None:
 class Rendering:
     """Shows the worlds of an environment.
 
+    Attributes:
+        viewer: The page of the mode ``"human"``, else None.
+
     Args:
         sim: The simulation.
         task: The task; goals with a position are marked.
@@ -54,9 +59,10 @@ class Rendering:
         self._sim, self._task, self._mode = sim, task, mode
         self._picture: Picture | None = None
         self._due = 0.0
+        self.viewer: Viewer | None = None
         if mode == "human":
-            self._viewer = sim.view(worlds=min(sim.worlds, 1024))
-            print(f"tightloop: {sim.name} is shown at {self._viewer.url}", file=sys.stderr, flush=True)
+            self.viewer = sim.view(worlds=min(sim.worlds, 1024))
+            print(f"tightloop: {sim.name} is shown at {self.viewer.url}", file=sys.stderr, flush=True)
         elif "body_q" not in sim.fields:
             cure = "start it with `python -m tightloop.env serve … --render`"
             raise ArgumentError(f"render_mode is {mode!r}, and frames of daemon `{sim.name}` carry no body_q; {cure}")
@@ -67,6 +73,20 @@ class Rendering:
             now = time.monotonic()
             time.sleep(max(self._due - now, 0.0))
             self._due = max(self._due, now) + seconds
+
+    def plot(self, times: NDArray[Any], values: Mapping[str, NDArray[Any]]) -> None:
+        """In the mode ``"human"``, plot values of the followed world.
+
+        Args:
+            times: Time of each world since its reset [s], shape ``(worlds,)``.
+            values: Arrays by name, each of that shape.
+        """
+        if self.viewer is None:
+            return
+        world = min(self.viewer.world, len(times) - 1)
+        # a world that has just begun an episode got nothing yet
+        if times[world] > 0.0:
+            self.viewer.plot(world, times[world], {name: value[world] for name, value in values.items()})
 
     def render(self, frame: Any, goal: NDArray[Any]) -> tuple[NDArray[np.uint8], ...] | None:
         """Render a picture of each world; None in the mode ``"human"``, whose page updates itself.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tightloop.arrays.inputs import whole_seed
 from tightloop.checks.signatures import checked_calls
 from tightloop.env.evaluation.results import check_options
+from tightloop.env.evaluation.step_buffers import Observations
 from tightloop.env.rendering import MODES
 from tightloop.env.task import Task
 from tightloop.env.vector import VectorEnv
@@ -22,7 +23,7 @@ _MANY = {"autoreset_mode", "n_envs", "num_env", "num_envs", "num_worlds", "world
 
 
 @checked_calls
-class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
+class Env(gymnasium.Env[Observations, NDArray[np.float32]]):
     """A task in one world; each step returns new arrays.
 
     An episode of a seed equals that of the world with the same seed in a `VectorEnv`.
@@ -52,7 +53,7 @@ class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    ) -> tuple[Observations, dict[str, Any]]:
         """Start an episode: the first one of a seed, or the next one. Returns the observation and the task's infos.
 
         Args:
@@ -67,9 +68,9 @@ class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
             raise ArgumentError(f"reset: seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
         super().reset(seed=None if seed is None else int(seed))
         obs, infos = self.vector.reset(seed=seed)
-        return obs[0], _info(infos)
+        return _first(obs), _info(infos)
 
-    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
 
         Args:
@@ -85,7 +86,7 @@ class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
         if given.shape != size or given.dtype.kind not in "fiu":
             raise ArgumentError(f"step: action is {action!r:.80}; give real numbers of shape {size}")
         obs, reward, terminated, truncated, infos = self.vector.step(given[None])
-        return obs[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), _info(infos)
+        return _first(obs), float(reward[0]), bool(terminated[0]), bool(truncated[0]), _info(infos)
 
     def set_state(self, qpos: ArrayLike, qvel: ArrayLike) -> None:
         """Set positions, shape ``(positions,)``, and velocities, as `VectorEnv.set_state` does."""
@@ -99,6 +100,11 @@ class Env(gymnasium.Env[NDArray[Any], NDArray[np.float32]]):
     def close(self) -> None:
         """End the simulation."""
         self.vector.close()
+
+
+def _first(obs: Observations) -> Observations:
+    """Return the observation of the only world."""
+    return {name: array[0] for name, array in obs.items()} if isinstance(obs, dict) else obs[0]
 
 
 def _info(infos: dict[str, Any]) -> dict[str, Any]:

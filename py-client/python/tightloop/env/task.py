@@ -4,31 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tightloop import _core
-from tightloop.checks import arguments as checks
 from tightloop.checks.attributes import nearest
-from tightloop.checks.signatures import checked_calls
 from tightloop.env.controls import Control
 from tightloop.env.episodes.disturbances import Push
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
+from tightloop.env.observed import Observed
 from tightloop.env.task_members import tell_of_class
 from tightloop.errors import ArgumentError, UnknownAttribute
-from tightloop.planning.policy_terms import Term
 from tightloop.scene.scene import Scene
 
 #: An array of NumPy, torch or JAX.
 Array = Any
 #: A namespace of array functions: ``numpy``, ``array_api_compat.torch``, ``jax.numpy``.
 Namespace = Any
-# Values of a part of an observation, which is far beyond any
-_SIZE_MAX = 2**20
 
 
 class Worlds:
@@ -91,68 +86,6 @@ class _Rows(Worlds):
 
         copied = self.__dict__[name] = of_rows(getattr(worlds, name))
         return copied
-
-
-@checked_calls
-@dataclass(frozen=True)
-class Observed:
-    """A part of the observation: name, size, bounds and unit.
-
-    Attributes:
-        name: What the part is.
-        low: Lower bound, for all values or for each; values are clipped to it.
-        high: Upper bound, likewise.
-        size: Number of values that `Task.observe` returns.
-        unit: Unit of the values.
-        history: Steps that the observation holds of this part, the oldest first: the current one and those before it.
-            An episode begins with copies of its first values.
-        source: Where the values come from in a frame, for rollouts with a policy inside (`Sim.rollout`): a term of
-            `tightloop.planning.policy_terms`. The metadata of policies has the terms if all parts have one.
-    """
-
-    name: str
-    low: ArrayLike
-    high: ArrayLike
-    size: int = 1
-    unit: str = "–"
-    history: int = 1
-    source: Term | None = None
-    bounds: NDArray[np.float32] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        name = checks.text("Observed: name", self.name, error=ArgumentError)
-        checks.text(f"observation `{name}`: unit", self.unit, error=ArgumentError)
-        size = checks.integer(f"observation `{name}`: size", self.size, error=ArgumentError)
-        if size > _SIZE_MAX:
-            raise ArgumentError(f"observation `{name}`: size is {size}; give at most {_SIZE_MAX}")
-        history = checks.integer(f"observation `{name}`: history", self.history, error=ArgumentError)
-        if history * size > _SIZE_MAX:
-            raise ArgumentError(f"observation `{name}`: history is {history}; give at most {_SIZE_MAX // size}")
-        try:
-            low, high = (np.broadcast_to(np.asarray(end, np.float32), (self.size,)) for end in (self.low, self.high))
-        except (TypeError, ValueError):
-            raise ArgumentError(
-                f"observation `{self.name}`: low and high must be numbers, or {self.size} each"
-            ) from None
-        if not (low < high).all():
-            raise ArgumentError(f"observation `{self.name}`: low {self.low} must be below high {self.high}")
-        if self.source is not None and not isinstance(self.source, Term):
-            cure = "give a term of tightloop.planning.policy_terms"
-            raise ArgumentError(f"observation `{self.name}`: source is {self.source!r:.80}; {cure}")
-        object.__setattr__(self, "bounds", np.stack([low, high]))
-
-    @property
-    def term(self) -> Term | None:
-        """The source with the bounds and history of this part; None if it has no source."""
-        if self.source is None:
-            return None
-        low, high = (float(str(end[0])) if (end == end[0]).all() else end for end in self.bounds)
-        return replace(self.source, low=low, high=high, history=self.history)
-
-    @property
-    def width(self) -> int:
-        """Number of values in the observation, history included."""
-        return self.size * self.history
 
 
 class _Undefined(ArgumentError, NotImplementedError):

@@ -28,7 +28,7 @@ from tightloop.env.episodes.states import SettableState
 from tightloop.env.evaluation.evaluation import Evaluation
 from tightloop.env.evaluation.memory import Memory
 from tightloop.env.evaluation.results import TASK_FAULT, OnNan, check_on_nan, refuse
-from tightloop.env.evaluation.step_buffers import BufferRing, StepBuffers
+from tightloop.env.evaluation.step_buffers import BufferRing, Observations, StepBuffers, with_nan, zero, zero_nan
 from tightloop.env.mirror import MirrorColumns
 from tightloop.env.names import Names
 from tightloop.env.registry import controls_of, make_task
@@ -39,17 +39,19 @@ from tightloop.env.task import Task, Worlds, episode_steps
 from tightloop.env.task_checks import check_task
 from tightloop.errors import ArgumentError, CommandRefused, DaemonLost, UnknownAttribute
 from tightloop.sim.sim import Sim
+from tightloop.sim.viewer_process import Viewer
 
-Step = tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+Step = tuple[Observations, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 
 
 @checked_calls
-class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], NDArray[Any]]):
+class VectorEnv(SettableState, GymVectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """A task in many worlds.
 
     Observations are float32, shape ``(num_envs, size)``, clipped to ``single_observation_space``. Actions have shape
     ``(num_envs, actions)`` and are clipped to ``single_action_space``. Rewards are float32.
-    Tasks may have float64 for observations and rewards.
+    Tasks may have float64 for observations and rewards. With ``dict_observations``, observations are a dict: images by
+    name, shape ``(num_envs, *shape)``, and ``"state"`` with all other parts, shape ``(num_envs, size)``.
 
     ``infos["privileged"]`` has the privileged observations of a task that has them, from `reset` too. In the step that
     ends an episode, ``infos["return/TERM"]`` has the sum of a term of its rewards.
@@ -87,6 +89,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         threads: int | None = None,
         max_episode_steps: float | None = None,
         on_nan: OnNan = "raise",
+        dict_observations: bool = False,
         daemon: str | Sim | None = None,
         first_env: int = 0,
         render_mode: str | None = None,
@@ -111,6 +114,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
                 is not faulted: ``"raise"`` raises an error that names the function and the world, after which the
                 environment needs a `reset`; ``"fault"`` terminates the world, with reward 0, observation 0 and bit 16
                 of ``infos["fault"]``. NaN in the first observation of an episode terminates it at its first step.
+            dict_observations: Whether observations are a dict, in which each part with a ``shape`` is an array of its
+                own: uint8 if its bounds are 0 and 255, float32 otherwise. Then `mirror` is None.
             daemon: Name of a running daemon to join, which ``python -m tightloop.env serve`` started for the task. It
                 continues when this process ends. Or a simulation of your own, such as one of `Groups`, which `close`
                 then closes. None launches a daemon that ends with this process.
@@ -128,6 +133,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         slots = checks.integer("slots", slots, least=2, error=ArgumentError)
         first_env = checks.integer("first_env", first_env, least=0, error=ArgumentError)
         copy = checks.flag("copy", copy, error=ArgumentError)
+        dict_observations = checks.flag("dict_observations", dict_observations, error=ArgumentError)
         if num_envs is not None:
             num_envs = checks.integer("num_envs", num_envs, error=ArgumentError)
         # a task is bound to one environment: two environments would share its arrays
@@ -157,7 +163,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             names = Names(self.sim.info)
             self.task.bind(names)
             self._actions = Actions(controls, scene, names, self.num_envs)
-            self.evaluation = Evaluation(self.task, self.num_envs)
+            self.evaluation = Evaluation(self.task, self.num_envs, as_dict=dict_observations)
             self._episodes = Episodes(self.task, self.num_envs, first_env)
             self._starts, self._memory = Starts(self.task, self.num_envs), Memory(self.task, self.num_envs)
             self._disturbances = Disturbances(self.task.disturbances(), names, self.num_envs, self.control_dt)
@@ -170,7 +176,8 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         self.single_action_space = self._actions.space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._ring = None if copy else BufferRing(self.num_envs, self.evaluation.observed, slots, self.task.dtype)
+        rooms = self.num_envs, self.evaluation.empty_observations
+        self._ring = None if copy else BufferRing(*rooms, slots, self.task.dtype)
         self._done = np.zeros(self.num_envs, np.bool_)
         self._all = np.ones(self.num_envs, np.bool_)
         # worlds whose results were NaN in this step, and those whose episode began with such an observation
@@ -198,6 +205,11 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         """Current goals, as pictures of `tightloop.view` mark them; None if the task's goals have no position."""
         return marks(self.task, self._episodes.goal)
 
+    @property
+    def viewer(self) -> Viewer | None:
+        """The page of ``render_mode="human"``, which plots the reward and its terms; None in other modes."""
+        return None if self._rendering is None else self._rendering.viewer
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(f"VectorEnv has no attribute {name!r}")
@@ -206,7 +218,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[Any], dict[str, Any]]:
+    ) -> tuple[Observations, dict[str, Any]]:
         """Start episodes in all worlds, or in those of ``options["reset_mask"]``.
 
         An episode depends only on its seed and on the number of episodes since that seed. ``reset(seed=…)`` repeats the
@@ -333,6 +345,9 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         self.evaluation.advance()
         self._score(buffers, infos, begun)
         np.logical_or(buffers.terminated, buffers.truncated, out=self._done)
+        if self._rendering is not None and self._rendering.viewer is not None:
+            terms = self.evaluation.terms.now
+            self._rendering.plot(self._episodes.elapsed * self.control_dt, {"reward": buffers.reward, **terms})
         self.evaluation.terms.end(self._done, infos)
         self._starts.end(self._done, self.evaluation)
         due = self._episodes.due()
@@ -368,7 +383,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         ended = self._done.copy()
         self._observe(buffers.final_obs)
         self._add_privileged(infos, None)
-        buffers.final_obs[~ended] = 0.0
+        zero(buffers.final_obs, ~ended)
         # infos of running episodes belong to this step, those of ended episodes to their last step
         infos["final_info"] = {name: mine & ended if name[0] == "_" else mine for name, mine in infos.items()}
         for name in infos["final_info"]:
@@ -398,6 +413,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         self._see(frame)
         rows = np.flatnonzero(mask)
         self._disturbances.begin(rows, own.seeds, own.numbers)
+        self.evaluation.begin(rows, own.seeds, own.numbers)
         own.begin(mask, self.evaluation.worlds)
         # the first goals and memories make new arrays, which the task's functions must see
         self._see(frame)
@@ -419,21 +435,20 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
         )
         return self.evaluation.worlds
 
-    def _observe(self, out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> None:
+    def _observe(self, out: Observations, begun: NDArray[np.bool_] | None = None) -> None:
         """Write observations; those of worlds in ``begun`` are the first ones of an episode."""
         if self.evaluation.observe(out, begun):
             # observations of a faulted world may be NaN
-            wrong = np.isnan(out)
             healthy = (self._frame.status & FAULTED) == 0
-            spoiled = wrong.any(axis=1) & healthy
+            spoiled = with_nan(out) & healthy
             if not self._faults_nan and spoiled.any():
-                raise refuse(self.evaluation.part_name(wrong[healthy]), spoiled)
-            out[wrong] = 0.0
-            out[spoiled] = 0.0
+                raise refuse(self.evaluation.part_name(out, healthy), spoiled)
+            zero_nan(out)
+            zero(out, spoiled)
             if begun is not None:
                 self._spoiled_start |= spoiled & begun
         if self._spoiled.any():
-            out[self._spoiled if begun is None else self._spoiled & ~begun] = 0.0
+            zero(out, self._spoiled if begun is None else self._spoiled & ~begun)
 
     def _add_privileged(self, infos: dict[str, Any], begun: NDArray[np.bool_] | None) -> None:
         """Write privileged observations into the infos, and what the task says of new episodes."""
@@ -478,7 +493,7 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
             value = str(buffers.reward[wrong][0])
             raise refuse(self.evaluation.function_name("reward"), wrong, value)
         if self._faults_nan and self.evaluation.observe(buffers.final_obs):
-            wrong |= np.isnan(buffers.final_obs).any(axis=1) & healthy
+            wrong |= with_nan(buffers.final_obs) & healthy
         if self._faults_nan:
             wrong |= self._spoiled_start & healthy
             self._spoiled_start[:] = False
@@ -487,5 +502,5 @@ class VectorEnv(SettableState, GymVectorEnv[NDArray[Any], NDArray[np.float32], N
 
     def _next_buffers(self) -> StepBuffers:
         if self._ring is None:
-            return StepBuffers(self.num_envs, self.evaluation.observed, self.task.dtype)
+            return StepBuffers(self.num_envs, self.evaluation.empty_observations, self.task.dtype)
         return self._ring.next()

@@ -31,7 +31,8 @@ from tightloop.assets import ANT
 from tightloop.env.controls import Control, JointTarget
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Task, Worlds
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.kinematics import projected_gravity, rotate_inverse
 from tightloop.tasks.velocity import AXIAL, CONTROL_DT, DT, POLAR, SUBSTEPS

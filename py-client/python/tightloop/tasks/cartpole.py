@@ -26,7 +26,8 @@ import numpy as np
 import tightloop as tl
 from tightloop.assets import CARTPOLE
 from tightloop.env.controls import Control, JointTorque
-from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Task, Worlds
 from tightloop.planning.policy_terms import Values
 
 URDF = CARTPOLE

@@ -9,7 +9,7 @@ import tightloop as tl
 from tightloop.assets import FR3
 from tightloop.checks.arguments import Vector
 from tightloop.env.controls import Control, EndEffectorDelta, Gripper, JointDelta, JointTarget, JointTorque
-from tightloop.env.task import Observed
+from tightloop.env.observed import Observed
 from tightloop.errors import ArgumentError
 from tightloop.planning.policy_terms import Values
 from tightloop.scene.shapes import ORIGIN, Surface

@@ -35,7 +35,8 @@ import numpy as np
 
 import tightloop as tl
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks import franka
 from tightloop.tasks.cube import CubeTask
 from tightloop.tasks.geometry import distance, in_box, squares

@@ -37,7 +37,8 @@ from functools import reduce
 import numpy as np
 
 import tightloop as tl
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks import franka
 from tightloop.tasks.cube import HALF, CubeTask, grasped
 from tightloop.tasks.geometry import distance, in_box

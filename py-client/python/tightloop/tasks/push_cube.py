@@ -28,7 +28,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import tightloop as tl
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks import franka
 from tightloop.tasks.cube import HALF, CubeTask
 from tightloop.tasks.pick_cube import BASE, SPREAD, START

@@ -28,7 +28,8 @@ from tightloop import terrain
 from tightloop.checks import arguments as checks
 from tightloop.env.mirror import Mirror
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.tasks.geometry import squares
 from tightloop.tasks.legged import ByJoint

@@ -29,7 +29,8 @@ import numpy as np
 import tightloop as tl
 from tightloop.env.controls import Control
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Task, Worlds
 from tightloop.planning.policy_terms import Input, LastAction
 from tightloop.tasks import franka
 from tightloop.tasks.geometry import angle, distance, in_box, squares

@@ -21,7 +21,8 @@ from tightloop.env.controls import Control
 from tightloop.env.episodes.disturbances import Push
 from tightloop.env.mirror import Flip, Mirror
 from tightloop.env.names import Names
-from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Task, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.planning.policy_terms import Clock, Gravity, Input, LastAction, Values
 from tightloop.tasks.geometry import squares

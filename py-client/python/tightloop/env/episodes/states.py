@@ -44,7 +44,8 @@ class SettableState:
     def set_state(self, qpos: ArrayLike, qvel: ArrayLike, *, mask: NDArray[np.bool_] | None = None) -> None:
         """Set positions and velocities of worlds, as `Task.states_of` defines them: for MuJoCo models as MuJoCo does.
 
-        The episodes go on from there; what a task remembers begins again.
+        The episodes go on from there; what a task remembers begins again, and so do histories and delays of
+        observations.
 
         Args:
             qpos: Positions, shape ``(num_envs, positions)``, or ``(positions,)`` for all worlds.
@@ -64,6 +65,7 @@ class SettableState:
         # not `write`, which warns of quaternions in MuJoCo's order: any may be meant here
         frame = called(self.sim, self.sim._client.write, arrays, np.ascontiguousarray(every), True)
         self._see(frame)
+        self.evaluation.restart(np.flatnonzero(every))
         self._memory.begin(np.flatnonzero(every), self.evaluation)
         self._see(frame)
 

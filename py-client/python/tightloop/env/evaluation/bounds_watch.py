@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tightloop.checks import advice
-from tightloop.env.task import Observed
+from tightloop.env.observed import Observed
 
 #: Worlds that are looked at, calls that make a window, and of how many later calls one is looked at.
 _WORLDS, _WINDOW, _EVERY = 64, 64, 32

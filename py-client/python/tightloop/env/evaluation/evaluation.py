@@ -9,17 +9,22 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from tightloop import _core
 from tightloop.env.evaluation.array_pool import ArrayPool
 from tightloop.env.evaluation.bounds_watch import BoundsWatch
+from tightloop.env.evaluation.dict_observations import DictPacker
 from tightloop.env.evaluation.observations import ObservationPacker
+from tightloop.env.evaluation.past import Past
 from tightloop.env.evaluation.results import check_metric_names
 from tightloop.env.evaluation.reward_terms import RewardTerms
-from tightloop.env.evaluation.step_buffers import aligned
+from tightloop.env.evaluation.step_buffers import Observations, aligned
 from tightloop.env.mirror import Mirror, MirrorColumns
 from tightloop.env.task import Array, Task, Worlds, observed_parts
 from tightloop.errors import ArgumentError
 
 _REAL, _BOOL, _ANY = "fiu", "b", "fiub"
+#: Stream of random numbers of delays.
+_DELAYS = 3
 
 
 class Evaluation:
@@ -29,16 +34,15 @@ class Evaluation:
 
     Attributes:
         worlds: The worlds that the functions see.
-        observed: Length of an observation.
         space: Observation space of one world.
     """
 
-    def __init__(self, task: Task, worlds: int) -> None:
+    def __init__(self, task: Task, worlds: int, *, as_dict: bool = False) -> None:
         self._task, self._count = task, worlds
         self._pool, self._tapes = ArrayPool(), {}
         parts = observed_parts(task)
-        self._packer, self._watch = ObservationPacker(parts, task.dtype), BoundsWatch(type(task).__name__, parts)
-        self.observed, self.space = self._packer.size, self._packer.space
+        self._packer = DictPacker(parts, task.dtype) if as_dict else ObservationPacker(parts, task.dtype)
+        self._watch, self.space = BoundsWatch(type(task).__name__, parts), self._packer.space
         privileged = task.privileged_observed()
         self._privileged = ObservationPacker(privileged) if privileged else None
         self.terms = RewardTerms(task, worlds)
@@ -54,13 +58,14 @@ class Evaluation:
         return None if self._privileged is None else self._privileged.space
 
     def mirror(self, actions: int) -> tuple[MirrorColumns, MirrorColumns, MirrorColumns | None] | None:
-        """Return the mirror symmetry of observations, actions and privileged observations; None without symmetry.
+        """Return the mirror symmetry of observations, actions and privileged observations; None without symmetry, and
+        of observations that are dicts.
 
         Raises:
             ArgumentError: It does not fit their parts.
         """
         mirror = self._task.mirrored()
-        if mirror is None:
+        if mirror is None or isinstance(self._packer, DictPacker):
             return None
         what = self.function_name("mirrored")
         if not isinstance(mirror, Mirror):
@@ -95,8 +100,31 @@ class Evaluation:
         if self._privileged is not None:
             self._privileged.advance()
 
-    def observe(self, out: NDArray[Any], begun: NDArray[np.bool_] | None = None) -> bool:
-        """Write the observations, shape ``(worlds, size)``; returns whether any is NaN.
+    def begin(self, rows: NDArray[np.intp], seeds: NDArray[np.uint64], episodes: NDArray[np.uint32]) -> None:
+        """Draw by how much parts are late in worlds that begin an episode."""
+        pasts = [past for past in self._pasts() if past.varies]
+        if not pasts:
+            return
+        draws = np.empty((len(rows), len(pasts)), np.float32)
+        _core.draw(seeds[rows], episodes[rows], _DELAYS, len(pasts), draws, np.zeros(len(rows), np.uint32))
+        for past, column in zip(pasts, draws.T, strict=True):
+            past.draw(rows, column)
+
+    def restart(self, rows: NDArray[np.intp]) -> None:
+        """Forget what parts were before in some worlds, whose state was set."""
+        for past in self._pasts():
+            past.restart(rows)
+
+    def _pasts(self) -> list[Past]:
+        packers = [self._packer, *([] if self._privileged is None else [self._privileged])]
+        return [past for packer in packers for past in packer.pasts(self._count).values()]
+
+    def empty_observations(self, worlds: int) -> Observations:
+        """Return what `observe` writes to, for so many worlds."""
+        return self._packer.empty(worlds)
+
+    def observe(self, out: Observations, begun: NDArray[np.bool_] | None = None) -> bool:
+        """Write the observations; returns whether any is NaN.
 
         Args:
             out: The observations.
@@ -190,10 +218,19 @@ class Evaluation:
             expected = "bool" if kinds == _BOOL else "real numbers"
             raise ArgumentError(f"{self.function_name(what)}: dtype {value.dtype}; return {expected}")
 
-    def part_name(self, wrong: NDArray[np.bool_]) -> str:
-        """Return the name of the first part that is wrong, of observations of shape ``(n, size)``, for messages."""
-        column = int(np.argmax(np.any(wrong, axis=0)))
-        return f"{self.function_name('observe')}: `{self._packer.part(column)}`"
+    def part_name(self, obs: Observations, worlds: NDArray[np.bool_]) -> str:
+        """Return the name of the first part that is NaN in some of the worlds, for messages."""
+
+        def column(array: NDArray[Any]) -> int:
+            wrong = np.isnan(array[worlds]).any(axis=0).reshape(-1)
+            return int(np.argmax(wrong)) if wrong.any() else -1
+
+        if isinstance(self._packer, DictPacker):
+            name, place = next((name, found) for name, array in obs.items() if (found := column(array)) >= 0)
+            part = self._packer.part(name, place)
+        else:
+            part = self._packer.part(column(obs))
+        return f"{self.function_name('observe')}: `{part}`"
 
     def function_name(self, function: str) -> str:
         return f"{type(self._task).__name__}.{function}"

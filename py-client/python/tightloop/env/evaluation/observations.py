@@ -10,10 +10,13 @@ from gymnasium.spaces import Box
 from numpy.typing import DTypeLike, NDArray
 
 from tightloop import _core
-from tightloop.env.task import Array, Observed
+from tightloop.env.evaluation.past import Past
+from tightloop.env.evaluation.step_buffers import aligned
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array
 from tightloop.errors import ArgumentError
 
-_TYPES = [np.dtype(name) for name in ("f4", "f8", "i4", "i8", "?")]
+_TYPES = [np.dtype(name) for name in ("f4", "f8", "i4", "i8", "?", "u1")]
 
 
 class ObservationPacker:
@@ -33,21 +36,29 @@ class ObservationPacker:
             np.ascontiguousarray(np.concatenate([np.tile(p.bounds[end], p.history) for p in parts])) for end in (0, 1)
         )
         self.space = Box(self._low.astype(dtype), self._high.astype(dtype), dtype=np.dtype(dtype).type)  # pyright: ignore[reportArgumentType]
-        # values of the steps before, the oldest first, and those of the last call, by index of the part
-        self._past: dict[int, NDArray[np.float32]] = {}
-        self._last: dict[int, NDArray[np.float32]] = {}
-        self._has_history = any(part.history > 1 for part in self._parts)
+        # by index of the part, where more than its values now are shown
+        self._past: dict[int, Past] = {}
 
     @property
     def parts(self) -> list[tuple[str, int, int]]:
         """Name, size and history of each part."""
         return [(part.name, part.size, part.history) for part in self._parts]
 
+    def empty(self, worlds: int) -> NDArray[Any]:
+        """Return an array for observations of so many worlds, without values."""
+        return aligned((worlds, self.size), self.space.dtype)
+
     def advance(self) -> None:
         """Make the values of the last call those of the step before."""
-        for index, past in self._past.items():
-            past[:, :-1] = past[:, 1:]
-            past[:, -1] = self._last[index]
+        for past in self._past.values():
+            past.advance()
+
+    def pasts(self, worlds: int) -> dict[int, Past]:
+        """Return the memories of parts that have one, by the part's index."""
+        if not self._past:
+            needed = (index for index, part in enumerate(self._parts) if Past.is_needed(part))
+            self._past = {index: Past(self._parts[index], worlds, self.space.dtype) for index in needed}
+        return self._past
 
     def part(self, column: int) -> str:
         """Return the name of the part that has a column."""
@@ -73,26 +84,19 @@ class ObservationPacker:
         for part, array in zip(self._parts, arrays, strict=True):
             if not isinstance(array, np.ndarray) or array.dtype not in _TYPES:
                 got = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
-                raise ArgumentError(f"observe: `{part.name}` is {got}; give an array of float32, float64, int or bool")
+                types = "float32, float64, int, uint8 or bool"
+                raise ArgumentError(f"observe: `{part.name}` is {got}; give an array of {types}")
             shape = (len(out),) if part.size == 1 and array.ndim == 1 else (len(out), part.size)
-            if array.shape != shape:
+            if array.shape not in (shape, (len(out), *(part.shape or ()))):
+                shape = (len(out), *(part.shape or (part.size,)))
                 raise ArgumentError(f"observe: `{part.name}` has shape {array.shape}; `observed` says {shape}")
-        packed = [np.asarray(array) for array in arrays]
-        if self._has_history:
-            self._add_history(packed, begun)
+        packed = [_plain(array, part, len(out)) for part, array in zip(self._parts, arrays, strict=True)]
+        for index, past in self.pasts(len(out)).items():
+            packed[index] = past.shown(packed[index].reshape(len(out), -1), begun)
         return _core.pack(out, packed, self._low, self._high)
 
-    def _add_history(self, packed: list[NDArray[Any]], begun: NDArray[np.bool_] | None) -> None:
-        """Put the steps before in front of the parts that have a history."""
-        for index, part in enumerate(self._parts):
-            if part.history == 1:
-                continue
-            worlds = len(packed[index])
-            if index not in self._past:
-                self._past[index] = np.zeros((worlds, part.history - 1, part.size), np.float32)
-                self._last[index] = np.zeros((worlds, part.size), np.float32)
-            past, last = self._past[index], self._last[index]
-            last[:] = packed[index].reshape(last.shape)
-            if begun is not None:
-                past[begun] = last[begun, None]
-            packed[index] = np.concatenate([past.reshape(worlds, -1), last], axis=1)
+
+def _plain(array: NDArray[Any], part: Observed, worlds: int) -> NDArray[Any]:
+    """Return a part as `_core.pack` takes it."""
+    plain = np.asarray(array) if part.shape is None else np.asarray(array).reshape(worlds, -1)
+    return plain.astype(np.float32) if plain.dtype == np.uint8 else plain

@@ -21,6 +21,7 @@ class RewardTerms:
 
     Attributes:
         is_used: Whether the task defines `Task.reward_terms`, and not `Task.reward` itself.
+        now: Weighted terms of the last step by name, each of shape ``(worlds,)``.
     """
 
     def __init__(self, task: Task, worlds: int) -> None:
@@ -30,7 +31,7 @@ class RewardTerms:
         self._worlds = worlds
         self._sums: dict[str, NDArray[np.float32]] = {}
         self._term = np.empty(worlds, np.float32)
-        self._now: dict[str, NDArray[np.float32]] = {}
+        self.now: dict[str, NDArray[np.float32]] = {}
 
     def add(self, terms: Any, out: NDArray[Any]) -> None:
         """Write the reward of a step, shape ``(worlds,)``.
@@ -38,19 +39,19 @@ class RewardTerms:
         Raises:
             ArgumentError: The terms are no dict of arrays by name, or the names are not those of the weights.
         """
-        if not self._now:
+        if not self.now:
             self._check(terms)
-            self._now = {name: np.zeros(self._worlds, np.float32) for name in terms}
+            self.now = {name: np.zeros(self._worlds, np.float32) for name in terms}
             self._sums = {name: np.zeros(self._worlds, np.float32) for name in terms}
         out[:] = 0.0
         for name, value in terms.items():
-            now = self._now[name]
+            now = self.now[name]
             np.multiply(value, self._weights[name], out=now, casting="same_kind")
             out += now
 
     def count(self, worlds: NDArray[np.bool_]) -> None:
         """Add the step to the sums of some worlds; a term that is no number counts as 0."""
-        for name, now in self._now.items():
+        for name, now in self.now.items():
             np.nan_to_num(now, copy=False, posinf=0.0, neginf=0.0)
             np.add(self._sums[name], now, out=self._sums[name], where=worlds)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -12,32 +13,71 @@ from numpy.typing import DTypeLike, NDArray
 _ALIGNMENT = 64
 
 
-class StepBuffers:
-    """The arrays of one step: ``obs`` ``(worlds, size)``, ``reward``, ``terminated``, ``truncated``, ``final_obs``."""
+#: Observations of all worlds: an array, or arrays by name.
+Observations = Any
 
-    def __init__(self, worlds: int, size: int, dtype: DTypeLike = np.float32) -> None:
-        self.obs = aligned((worlds, size), dtype)
+
+class StepBuffers:
+    """The arrays of one step: ``obs``, ``reward``, ``terminated``, ``truncated``, ``final_obs``.
+
+    Args:
+        worlds: Number of worlds.
+        observations: Makes arrays for observations of so many worlds.
+        dtype: Type of rewards.
+    """
+
+    def __init__(self, worlds: int, observations: Callable[[int], Observations], dtype: DTypeLike = np.float32) -> None:
+        self._make = lambda: observations(worlds)
+        self.obs = self._make()
         self.reward = aligned((worlds,), dtype)
         self.terminated = aligned((worlds,), np.bool_)
         self.truncated = aligned((worlds,), np.bool_)
 
     @cached_property
-    def final_obs(self) -> NDArray[Any]:
+    def final_obs(self) -> Observations:
         """Last observations, like ``obs``; made on demand, since most steps end no episode."""
-        return aligned(self.obs.shape, self.obs.dtype)
+        return self._make()
 
 
 class BufferRing:
     """BufferRing in turn. A ring's arrays are valid until as many further steps were taken as it has slots."""
 
-    def __init__(self, worlds: int, size: int, count: int, dtype: DTypeLike = np.float32) -> None:
-        self._ring = [StepBuffers(worlds, size, dtype) for _ in range(count)]
+    def __init__(
+        self,
+        worlds: int,
+        observations: Callable[[int], Observations],
+        count: int,
+        dtype: DTypeLike = np.float32,
+    ) -> None:
+        self._ring = [StepBuffers(worlds, observations, dtype) for _ in range(count)]
         self._index = 0
 
     def next(self) -> StepBuffers:
         """Return the buffers of the next step."""
         self._index = (self._index + 1) % len(self._ring)
         return self._ring[self._index]
+
+
+def arrays_of(obs: Observations) -> list[NDArray[Any]]:
+    """Return the arrays of observations."""
+    return [*obs.values()] if isinstance(obs, dict) else [obs]
+
+
+def zero(obs: Observations, worlds: NDArray[np.bool_]) -> None:
+    """Set the observations of some worlds to 0."""
+    for array in arrays_of(obs):
+        array[worlds] = 0
+
+
+def zero_nan(obs: Observations) -> None:
+    """Set NaN in observations to 0."""
+    for array in arrays_of(obs):
+        array[np.isnan(array)] = 0
+
+
+def with_nan(obs: Observations) -> NDArray[np.bool_]:
+    """Return which worlds have NaN in their observations."""
+    return np.logical_or.reduce([np.isnan(array).any(axis=tuple(range(1, array.ndim))) for array in arrays_of(obs)])
 
 
 def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks.gymnasium.base import GymnasiumTask, squared
 
 _ARM = 7  # joints of Pusher's arm

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 import tightloop as tl
 from tightloop.checks.signatures import unknown_argument
 from tightloop.env.controls import ActuatorControl, Control
-from tightloop.env.task import Array, Namespace, Observed, Task, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Task, Worlds
 from tightloop.errors import ArgumentError, MissingLibrary
 from tightloop.mujoco import export
 

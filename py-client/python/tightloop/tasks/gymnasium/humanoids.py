@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.errors import ArgumentError
 from tightloop.tasks.gymnasium.base import GymnasiumTask, speed, squared, vector
 

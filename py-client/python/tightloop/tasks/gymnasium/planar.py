@@ -16,7 +16,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tightloop.env.task import Array, Namespace, Observed, Worlds
+from tightloop.env.observed import Observed
+from tightloop.env.task import Array, Namespace, Worlds
 from tightloop.tasks.gymnasium.base import GymnasiumTask, normal, speed, squared, vector
 
 #: Bound of the velocities that Hopper and Walker2d observe [m/s or rad/s].
