@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ Vector = Sequence[float] | NDArray[np.float64]
 class Told:
     """What a task says of a world."""
 
-    obs: list[float]
+    obs: list[float] | NDArray[np.float64]
     reward: float
     terminated: bool = False
     success: bool = False
@@ -75,6 +75,11 @@ def pick_cube(world: World) -> Told:
         reward += 1 - math.tanh(5 * math.hypot(*arm))
     obs = [*q[:9], *qd[:9], float(held), *tcp, *goal, *q[9:16], *(cube - tcp[:3]), *(goal - cube)]
     return Told(obs, 1.0 if success else reward / 5, success=success)
+
+
+def pick_cube_depth(world: World) -> Told:
+    known = pick_cube(world)
+    return replace(known, obs=np.concatenate([known.obs[:29], world["wrist_depth"].ravel()]))
 
 
 def lift(world: World) -> Told:
@@ -195,6 +200,7 @@ PLAIN: dict[str, Callable[[World], Told]] = {
     "FrankaReach": reach,
     "FrankaPushCube": push_cube,
     "FrankaPickCube": pick_cube,
+    "FrankaPickCubeDepth": pick_cube_depth,
     "FrankaLift": lift,
     "QuadrupedVelocityFlat": quadruped,
     "QuadrupedVelocityRough": quadruped_rough,
@@ -266,6 +272,8 @@ def any_worlds(envs: Any, count: int, seed: int) -> Worlds:
         opens = np.stack([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)], 1)
         pressed = near(np.stack([opens, -opens], 1), 0.5, 3.0)
         arrays["contact_sensor"] = rng.choice([0.0, 0.4, 1.0, 30.0], (count, 2, 1)) * pressed
+    if "wrist_depth" in arrays:
+        arrays["wrist_depth"] = near(np.full_like(arrays["wrist_depth"], 0.5), 0.4, 0.7)
     elapsed = np.zeros(count, np.int32)
     return Worlds(elapsed=elapsed, **{name: array.astype(np.float32) for name, array in arrays.items()})
 
