@@ -28,7 +28,7 @@ QUANTILES = (12.71, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.22
 UNITS = {"error": "m", "velocity_error": "mps"}  # of the metrics of tightloop's tasks; the others have none
 # How tasks are made for evaluations: on ground of all levels
 OPTIONS: dict[str, dict[str, Any]] = {"QuadrupedVelocityRough": {"first_levels": 10}}
-NO_METRICS = ("fault", "final_obs", "final_info")  # in infos
+NO_METRICS = ("fault", "final_obs", "final_info", "privileged")  # in infos
 
 
 def metrics(infos: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -3,6 +3,7 @@
     pip install onnx
     python examples/policy_file.py examples/trained/FrankaReach.onnx
     python examples/policy_file.py out/rsl_rl/FrankaReach-0/policy.onnx --task FrankaReach
+    python examples/policy_file.py out/ppo/FrankaPickCubeDepth-0/policy.onnx --half
 
 The metadata says what a program needs to run the policy elsewhere: names and order of the observation, the action and
 the joints, scales, rates and gains. ``docs/pages/use/walking.md`` lists its entries.
@@ -15,6 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from learning.program import needed
 
 from tightloop.env import VectorEnv, policy_metadata
@@ -28,6 +30,7 @@ with needed("onnx"):
 if TYPE_CHECKING:
     from torch import nn
 
+LARGE = 10_000  # numbers of a weight that `halve` stores in half precision
 NORMALIZATION = "observation_normalization"  # how the graph takes observations, which no task says
 
 
@@ -77,6 +80,21 @@ def attach(path: Path, metadata: Mapping[str, str]) -> None:
         onnx.save(model, part)
 
 
+def halve(path: Path) -> None:
+    """Store the large weights of an ONNX file in half precision; it computes in single precision as before."""
+    model = loaded(path)
+    graph = model.graph
+    for weight in [weight for weight in graph.initializer if weight.data_type == onnx.TensorProto.FLOAT]:
+        values = onnx.numpy_helper.to_array(weight)
+        if values.size < LARGE:
+            continue
+        name, half = weight.name, f"{weight.name}_half"
+        weight.CopyFrom(onnx.numpy_helper.from_array(values.astype(np.float16), half))
+        graph.node.insert(0, onnx.helper.make_node("Cast", [half], [name], to=onnx.TensorProto.FLOAT))
+    with whole_file(path) as part:
+        onnx.save(model, part)
+
+
 def loaded(path: Path) -> onnx.ModelProto:
     """Return the model of a file.
 
@@ -101,7 +119,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Show the metadata of a policy, or write that of a task into it.")
     parser.add_argument("policy", type=Path, help="ONNX file")
     parser.add_argument("--task", help="task of the policy, such as FrankaReach or FILE.py:CLASS")
+    parser.add_argument("--half", action="store_true", help="store large weights in half precision")
     args = parser.parse_args()
+    if args.half:
+        halve(args.policy)
     if args.task is not None:
         envs = VectorEnv(args.task, 1, threads=1)
         try:

@@ -10,6 +10,9 @@ continued by the critic's value of its last observation. The learning rate follo
 divergence). With ``--mirror`` actor and critic are symmetric by construction, so that a step to the left teaches one to
 the right. With ``--muon`` hidden layers learn by Muon, the others by Adam.
 
+A task may observe images: parts with the shape (height, width). An estimator then learns beside the policy what only
+the critic is shown (`Task.privileged_observed`), and the policy acts on its estimates.
+
 In ``out/ppo/TASK-SEED`` it leaves a checkpoint every few seconds (``--resume`` goes on from it), the log for
 TensorBoard, the curve as CSV and PNG, and the policy as ONNX with its metadata, which ``examples/play.py`` runs.
 ``--wandb`` logs to Weights & Biases, too. ``--film-every 5`` films the policy every five minutes, in another process.
@@ -30,7 +33,7 @@ import sys
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, astuple, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +59,7 @@ from tightloop.whole_files import whole_file
 with needed("matplotlib", "onnx", "onnxscript", "tensorboard", "torch", "tqdm"):
     import torch
     from learning.agent import Agent
+    from learning.estimator import ESTIMATED, EstimatorTrainer, Sight
     from learning.optimizer import Optimizer
     from learning.rollout import Rollout
     from policy_file import export
@@ -95,14 +99,23 @@ class Trainer:
         (inputs,), (actions,) = (self.envs.single_observation_space.shape, self.envs.single_action_space.shape)
         space = self.envs.evaluation.privileged_space
         critic_inputs = None if space is None else space.shape[0]
+        sight = Sight.of(self.envs.task.observed(), self.envs.task.privileged_observed())
         self.device = torch.device(device)
         sizes = (inputs, actions, inputs if critic_inputs is None else critic_inputs, config.hidden, config.std)
         if config.mirror and self.envs.mirror is None:
             print(f"{task}: no mirror image of the robot is known, so actor and critic are plain", file=sys.stderr)
-        self.agent = Agent(*sizes, mirrors=self.envs.mirror if config.mirror else None).to(self.device)
-        self.optimizer = Optimizer(self.agent, config.lr, muon=config.muon)
+        mirrors = self.envs.mirror if config.mirror else None
+        if sight is not None and mirrors is not None:
+            raise SystemExit(f"{task}: a policy that sees images has no mirror image; give --no-mirror")
+        self.agent = Agent(*sizes, mirrors=mirrors, sight=sight).to(self.device)
+        self.optimizer, self.estimation = Optimizer(self.agent, config.lr, muon=config.muon), None
+        rooms: tuple[Any, ...] = (config, inputs, actions, critic_inputs, self.device)
+        images = None
+        if self.agent.estimator is not None:
+            self.estimation, images = EstimatorTrainer(self.agent.estimator), inputs
+            rooms = (config, self.agent.estimator.outputs, *rooms[2:])
         self.acting = copy.deepcopy(self.agent)
-        self.rollouts = [Rollout(config, inputs, actions, critic_inputs, self.device) for _ in range(2)]
+        self.rollouts = [Rollout(*rooms, images=images) for _ in range(2)]
         # one each: the threads that collect and learn run at once
         self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
         self.statistics, self.terms = Statistics(config.num_envs), TermWatch()
@@ -130,9 +143,16 @@ class Trainer:
         """Fill a rollout, from these observations on; returns those after it."""
         agent, config = self.acting, self.config
         std = torch.exp(agent.log_std)
+        if agent.estimator is not None:
+            drawn = torch.rand(config.num_envs, generator=self.noise, device=self.device)
+            rollout.worlds = drawn >= ESTIMATED
         for step in range(config.steps):
-            rollout.see(step, *seen)
-            mean = agent(rollout.obs[step])
+            own, critic = seen
+            if agent.estimator is not None and rollout.images is not None:
+                own = agent.features(rollout.images[step].copy_(own))
+                agent.estimator.reveal(own, critic, rollout.worlds)
+            rollout.see(step, own, critic)
+            mean = agent.act(rollout.obs[step])
             action = mean + std * torch.randn(mean.shape, generator=self.noise, device=self.device)
             self.envs.send(action.cpu().numpy())
             # while the worlds step
@@ -148,25 +168,29 @@ class Trainer:
                 last = infos["final_info"].get("privileged", infos["final_obs"])[cut]
                 rows = torch.from_numpy(cut).to(self.device)
                 rollout.cuts.append((step, rows, torch.from_numpy(last).to(self.device, torch.float32)))
-        rollout.see(config.steps, *seen)
+        # the critic alone sees the last ones
+        rollout.see(config.steps, seen[0] if agent.estimator is None else rollout.obs[-1], seen[1])
         self.steps += config.steps * config.num_envs
         return seen
 
     @torch.no_grad()
     def _look_back(self, r: Rollout) -> tuple[list[int], Tensor]:
-        """A row for each step of each world, and the sizes of its parts, which `learn` names."""
+        """A row for each step of each world to learn from, and the sizes of its parts, which `learn` names."""
         agent, steps = self.agent, self.config.steps
         obs, critic_obs = agent.inputs(r.obs, r.critic_obs)
         mean, value = agent.mean(obs[:steps]), agent.worth(critic_obs)
         log_prob = agent.log_prob(mean, r.action)
         advantage, target = r.look_back(value, [agent.value(last) for _, _, last in r.cuts])
-        advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+        chosen = advantage[:, r.worlds]
+        advantage = (advantage - chosen.mean()) / (chosen.std() + 1e-8)
         # a critic that sees the same needs no columns of its own
         of_critic = critic_obs[:steps, :, :0] if r.critic_obs is r.obs else critic_obs[:steps]
         weight = torch.exp(log_prob - r.log_prob).clamp(max=2.0)
         scalars = (log_prob, value[:steps], weight, advantage, target)
         parts = (obs[:steps], of_critic, r.action, mean, *(scalar[..., None] for scalar in scalars))
-        return [part.shape[-1] for part in parts], torch.cat(parts, -1).flatten(0, 1)
+        rows = torch.cat(parts, -1)
+        rows = rows if r.worlds.all() else rows[:, r.worlds]
+        return [part.shape[-1] for part in parts], rows.flatten(0, 1)
 
     def learn(self, r: Rollout, progress: float) -> dict[str, float]:
         """Some epochs of minibatches over a rollout; returns what to log. ``progress`` is that of the run.
@@ -191,7 +215,7 @@ class Trainer:
                 loss = off - (weight * better).mean() - entropy * agent.log_std.sum()
                 self.optimizer.zero_grad()
                 loss.backward()
-                nn.utils.clip_grad_norm_(agent.parameters(), config.grad_max)
+                nn.utils.clip_grad_norm_(agent.policy_parameters(), config.grad_max)
                 with torch.no_grad():
                     std = torch.exp(agent.log_std)
                     change = (std_old**2 + (mean - mean_old) ** 2) / (2.0 * std**2)
@@ -200,8 +224,15 @@ class Trainer:
                 self.optimizer.step()
                 moved.append(kl)
                 losses.append(off.item())
-        agent.see(r.obs[: config.steps], r.critic_obs[: config.steps])
+        agent.see(r.obs[: config.steps, r.worlds], r.critic_obs[: config.steps, r.worlds])
+        estimated = {}
+        if self.estimation is not None and r.images is not None:
+            count = config.steps * config.num_envs
+            order = torch.randperm(count, generator=self.shuffle, device=self.device)
+            given = (values[: config.steps].flatten(0, 1) for values in (r.images, r.critic_obs))
+            estimated["learn/estimate_error"] = self.estimation.learn(*given, order, progress)
         return {
+            **estimated,
             "learn/kl_nats": float(np.mean(moved)),
             "learn/value_loss": float(np.mean(losses)),
             "learn/action_std": float(std_old.mean()),
@@ -266,7 +297,8 @@ class Trainer:
         """Write the policy to a file from which another process makes it again."""
         agent = self.acting.plain()
         weights = {name: value.cpu() for name, value in agent.state_dict().items()}
-        state = {"sizes": agent.sizes, "agent": weights, "about": about}
+        sight = None if agent.estimator is None else astuple(agent.estimator.sight)
+        state = {"sizes": agent.sizes, "sight": sight, "agent": weights, "about": about}
         with whole_file(path, durable=False) as part:
             torch.save(state, part)
 
@@ -277,6 +309,7 @@ class Trainer:
             "config": asdict(self.config),
             "agent": self.agent.state_dict(),
             "optimizer": self.optimizer.state_dict(),
+            "estimator": None if self.estimation is None else self.estimation.optimizer.state_dict(),
             "random": [self.noise.get_state(), self.shuffle.get_state()],
             "seconds": self.seconds,
             "steps": self.steps,
@@ -293,6 +326,8 @@ class Trainer:
             raise SystemExit(f"{self.folder / 'checkpoint.pt'} is of {state['task']}, not of {self.task}")
         self.agent.load_state_dict(state["agent"])
         self.optimizer.load_state_dict(state["optimizer"])
+        if self.estimation is not None:
+            self.estimation.optimizer.load_state_dict(state["estimator"])
         self.acting.load_state_dict(state["agent"])
         for generator, random in zip((self.noise, self.shuffle), state["random"], strict=True):
             generator.set_state(random)

@@ -9,6 +9,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from learning.estimator import Estimator, Sight
+from learning.normalizer import Normalizer
 from tightloop.env.mirror import MirrorColumns
 
 HALF = math.sqrt(0.5)
@@ -50,37 +52,6 @@ class Halves(nn.Module):
 
     def forward(self, values: Tensor) -> Tensor:
         return values @ self.basis.T
-
-
-class Normalizer(nn.Module):
-    """Shifts and scales observations by the mean and variance of all that were seen (Chan et al. 1979)."""
-
-    mean: Tensor
-    var: Tensor
-    count: Tensor
-
-    def __init__(self, size: int) -> None:
-        super().__init__()
-        self.register_buffer("mean", torch.zeros(size))
-        self.register_buffer("var", torch.ones(size))
-        self.register_buffer("count", torch.tensor(1e-4))
-
-    def see(self, obs: Tensor, halves: Halves | None = None) -> None:
-        """Take observations ``(…, size)`` into account, and their mirror image if there is one."""
-        obs = obs.reshape(-1, obs.shape[-1])
-        count, mean, var = len(obs), obs.mean(0), obs.var(0, correction=0)
-        if halves is not None:
-            other = halves.flip(mean)
-            var = (var + var[halves.order]) / 2.0 + ((mean - other) / 2.0) ** 2
-            mean = (mean + other) / 2.0
-        total = self.count + count
-        apart = mean - self.mean
-        self.var.copy_((self.var * self.count + var * count + apart**2 * self.count * count / total) / total)
-        self.mean.add_(apart * count / total)
-        self.count.copy_(total)
-
-    def forward(self, obs: Tensor) -> Tensor:
-        return ((obs - self.mean) / torch.sqrt(self.var + 1e-6)).clamp(-10.0, 10.0)
 
 
 def mlp(inputs: int, hidden: int, outputs: int, last: float) -> nn.Sequential:
@@ -169,7 +140,8 @@ class MirrorMlp(nn.Module):
 class Agent(nn.Module):
     """An actor, whose actions are normal about its output, and a critic, which may see more than the actor.
 
-    With ``mirrors`` both are symmetric: the mirror image of an observation gives that of the action.
+    With ``mirrors`` both are symmetric: the mirror image of an observation gives that of the action. With ``sight`` the
+    actor takes `features` of observations, which an estimator finds in images.
     """
 
     def __init__(
@@ -181,10 +153,15 @@ class Agent(nn.Module):
         std: float,
         *,
         mirrors: Mirrors | None = None,
+        sight: Sight | None = None,
     ) -> None:
         super().__init__()
         self.sizes = (inputs, actions, critic_inputs, hidden, std)
-        self.normalizer, self.critic_normalizer = (Normalizer(inputs), Normalizer(critic_inputs))
+        self.estimator = None if sight is None else Estimator(sight)
+        least = None
+        if self.estimator is not None:
+            inputs, least = self.estimator.outputs, self.estimator.least()
+        self.normalizer, self.critic_normalizer = Normalizer(inputs, least), Normalizer(critic_inputs)
         self.halves: tuple[Halves, Halves] | None = None
         if mirrors is None:
             self.actor = mlp(inputs, hidden, actions, 0.01)
@@ -195,6 +172,11 @@ class Agent(nn.Module):
             self.actor = MirrorMlp(self.halves[0], hidden, Halves(acts), 0.01)
             self.critic = MirrorMlp(self.halves[1], hidden, None, 1.0)
         self.log_std = nn.Parameter(torch.full((actions,), math.log(std)))
+
+    def policy_parameters(self) -> list[nn.Parameter]:
+        """Return all parameters but those of the estimator, which learns by itself."""
+        apart = set() if self.estimator is None else {id(parameter) for parameter in self.estimator.parameters()}
+        return [parameter for parameter in self.parameters() if id(parameter) not in apart]
 
     def hidden_weights(self) -> list[nn.Parameter]:
         """Return the weight matrices that lead to hidden units."""
@@ -228,9 +210,17 @@ class Agent(nn.Module):
         critic = self.critic
         return (critic.of_halves(inputs) if isinstance(critic, MirrorMlp) else critic(inputs)).squeeze(-1)
 
-    def forward(self, obs: Tensor) -> Tensor:
+    def features(self, obs: Tensor) -> Tensor:
+        """Return what the actor takes, ``(worlds, …)``: the observations themselves where there are no images."""
+        return obs if self.estimator is None else self.estimator.features(obs)
+
+    def act(self, features: Tensor) -> Tensor:
         """The most likely action, ``(…, actions)``."""
-        return self.actor(self.normalizer(obs))
+        return self.actor(self.normalizer(features))
+
+    def forward(self, obs: Tensor) -> Tensor:
+        """The most likely action at observations, ``(…, actions)``."""
+        return self.act(self.features(obs))
 
     def value(self, obs: Tensor) -> Tensor:
         """What is still to come, ``(…,)``, at observations of the critic."""

@@ -49,6 +49,9 @@ PRESETS = {
     "FrankaPickCube": Config(
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
+    "FrankaPickCubeDepth": Config(
+        30.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=120.0
+    ),
     "QuadrupedVelocityFlat": Config(
         5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
     ),

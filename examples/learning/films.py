@@ -111,11 +111,12 @@ def film(snapshot: str, out: str, parent: str) -> None:
     import torch
 
     from learning.agent import Agent
+    from learning.estimator import Sight
 
     torch.set_num_threads(1)
     state = torch.load(snapshot, weights_only=True)
     Path(snapshot).unlink()
-    agent = Agent(*state["sizes"])
+    agent = Agent(*state["sizes"], sight=Sight(*state["sight"]) if state["sight"] else None)
     agent.load_state_dict(state["agent"])
     about = json.loads(state["about"])
     envs = VectorEnv(about["task"], FILMED, threads=about["threads"], render_mode="rgb_array", **about["made"])

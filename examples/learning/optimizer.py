@@ -24,7 +24,7 @@ class Optimizer:
         """Start with the learning rate ``lr``."""
         hidden = agent.hidden_weights() if muon else []
         apart = {id(weight) for weight in hidden}
-        others = [parameter for parameter in agent.parameters() if id(parameter) not in apart]
+        others = [parameter for parameter in agent.policy_parameters() if id(parameter) not in apart]
         self.parts: list[torch.optim.Optimizer] = [torch.optim.Adam(others, lr=lr, eps=1e-5, fused=True)]
         if hidden:
             if not hasattr(torch.optim, "Muon"):

@@ -26,8 +26,26 @@ class Rollout:
     """What all worlds did for some steps, ``(steps, worlds, …)``; observations have those after the last step, too."""
 
     def __init__(
-        self, config: Sizes, inputs: int, actions: int, critic_inputs: int | None, device: torch.device
+        self,
+        config: Sizes,
+        inputs: int,
+        actions: int,
+        critic_inputs: int | None,
+        device: torch.device,
+        *,
+        images: int | None = None,
     ) -> None:
+        """Make room.
+
+        Args:
+            config: Numbers of the run.
+            inputs: Numbers that the actor takes.
+            actions: Numbers of an action.
+            critic_inputs: Numbers that the critic takes; None if they are the actor's.
+            device: Where the arrays are.
+            images: Numbers of an observation of which the actor takes features; None if it takes observations.
+        """
+
         def room(steps: int, *shape: int) -> Tensor:
             return torch.zeros((steps, config.num_envs, *shape), device=device)
 
@@ -36,6 +54,9 @@ class Rollout:
         self.obs, self.action = room(steps + 1, inputs), room(steps, actions)
         # the critic sees the same, or more
         self.critic_obs = self.obs if critic_inputs is None else room(steps + 1, critic_inputs)
+        self.images = None if images is None else room(steps, images)
+        #: Worlds that the policy learns from, a mask; those that it acted in as it learns to.
+        self.worlds = torch.ones(config.num_envs, dtype=torch.bool, device=device)
         self.reward, self.done, self.log_prob = (room(steps) for _ in range(3))
         #: Step, worlds and last observations for the critic of episodes that were cut off.
         self.cuts: list[tuple[int, Tensor, Tensor]] = []

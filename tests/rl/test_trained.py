@@ -29,6 +29,7 @@ MARKS = {
     "FrankaReach": ("error", 0.02),
     "FrankaPushCube": ("success", 0.9),
     "FrankaPickCube": ("success", 0.8),
+    "FrankaPickCubeDepth": ("success", 0.8),
     "QuadrupedVelocityFlat": ("velocity_error", 0.15),
     "QuadrupedVelocityRough": ("farthest", 4.5),
     "HumanoidVelocityFlat": ("velocity_error", 0.15),
