@@ -100,7 +100,7 @@ def test_a_task_without_images_has_its_state_alone(make: Callable[..., VectorEnv
     assert [*other] == ["state"] and np.array_equal(one, other["state"])
 
 
-def wrong_task(parts: Sequence[Observed], arrays: Callable[[Any], Sequence[Any]]) -> type[Watch]:
+def wrong_task(parts: Sequence[Observed], arrays: Callable[[Any], Any]) -> type[Watch]:
     class Wrong(Watch):
         def observed(self) -> Sequence[Observed]:
             return parts
@@ -112,7 +112,7 @@ def wrong_task(parts: Sequence[Observed], arrays: Callable[[Any], Sequence[Any]]
 
 
 IMAGE = (HEIGHT, WIDTH)
-WRONG: list[tuple[list[Observed], Callable[[Any], Sequence[Any]], bool, str]] = [
+WRONG: list[tuple[list[Observed], Callable[[Any], Any], bool, str]] = [
     ([Observed("state", 0, 5, shape=IMAGE)], lambda w: (w.side_depth,), True, "names of their own, other than 'state'"),
     ([Observed("a", 0, 5, shape=IMAGE)] * 2, lambda w: (w.side_depth,) * 2, True, "names of their own"),
     (
@@ -149,7 +149,7 @@ WRONG: list[tuple[list[Observed], Callable[[Any], Sequence[Any]], bool, str]] = 
 def test_what_is_wrong_with_an_image_is_named(
     make: Callable[..., VectorEnv],
     parts: list[Observed],
-    arrays: Callable[[Any], Sequence[Any]],
+    arrays: Callable[[Any], Any],
     message: str,
     *,
     as_dict: bool,

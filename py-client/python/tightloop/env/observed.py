@@ -94,10 +94,10 @@ class Observed:
         """Keep the delay as its least and its most."""
         what, delay = f"observation `{name}`: delay", cast("Any", self.delay)
         is_pair = isinstance(delay, Sequence) and not isinstance(delay, str)
-        pair = delay if is_pair else (delay, delay)
+        pair: Sequence[Any] = cast("Any", delay) if is_pair else (delay, delay)
         if len(pair) != 2:
             raise ArgumentError(f"{what} is {delay!r:.80}; give control steps, or the least and the most of them")
-        least, longest = (checks.integer(what, steps, least=0, error=ArgumentError) for steps in pair)
+        least, longest = (checks.integer(what, cast("Any", steps), least=0, error=ArgumentError) for steps in pair)
         if least > longest:
             raise ArgumentError(f"{what} is {delay!r}; give the least first")
         if longest > most:
