@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import animation
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -72,8 +73,7 @@ def main() -> None:
     images = [Image.fromarray(pixels) for pixels in first + second]
     durations = [PICTURE_MS] * len(images)
     durations[len(first) - 1] = LAST_MS
-    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0, quality=QUALITY, method=6)
-    print(f"{path}: {len(images)} pictures, {path.stat().st_size / 1e3:.0f} kB")
+    animation.write(path, images, durations, QUALITY)
 
 
 if __name__ == "__main__":

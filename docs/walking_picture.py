@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+import animation
 import numpy as np
 import onnxruntime
 from PIL import Image
@@ -115,8 +116,7 @@ def main() -> None:
     finally:
         envs.close()
     duration = round(1000 * EVERY * envs.control_dt)
-    images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, quality=QUALITY, method=6)
-    print(f"{path}: {len(images)} pictures, {path.stat().st_size / 1e3:.0f} kB")
+    animation.write(path, images, duration, QUALITY)
 
 
 if __name__ == "__main__":

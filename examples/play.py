@@ -140,10 +140,11 @@ def main() -> None:
     options = {
         path: other.get_modelmeta().custom_metadata_map.get("task_options", "{}") for path, other in policies.items()
     }
+    first = next(iter(options.values()))
     for path, text in options.items():
-        if text != (first := next(iter(options.values()))):
+        if text != first:
             raise SystemExit(f"{path} is of a task made with {text}, and the first policy of one with {first}")
-    made = json.loads(next(iter(options.values())))
+    made = json.loads(first)
     mode = "human" if args.view else "rgb_array" if args.film else None
     envs = VectorEnv(args.task, args.num_envs, autoreset_mode=AutoresetMode.SAME_STEP, render_mode=mode, **made)
     try:

@@ -108,14 +108,14 @@ class Trainer:
         if sight is not None and mirrors is not None:
             raise SystemExit(f"{task}: a policy that sees images has no mirror image; give --no-mirror")
         self.agent = Agent(*sizes, mirrors=mirrors, sight=sight).to(self.device)
-        self.optimizer, self.estimation = Optimizer(self.agent, config.lr, muon=config.muon), None
-        rooms: tuple[Any, ...] = (config, inputs, actions, critic_inputs, self.device)
-        images = None
-        if self.agent.estimator is not None:
-            self.estimation, images = EstimatorTrainer(self.agent.estimator), inputs
-            rooms = (config, self.agent.estimator.outputs, *rooms[2:])
+        self.optimizer = Optimizer(self.agent, config.lr, muon=config.muon)
+        estimator = self.agent.estimator
+        self.estimation = None if estimator is None else EstimatorTrainer(estimator)
+        features, images = (inputs, None) if estimator is None else (estimator.outputs, inputs)
         self.acting = copy.deepcopy(self.agent)
-        self.rollouts = [Rollout(*rooms, images=images) for _ in range(2)]
+        self.rollouts = [
+            Rollout(config, features, actions, critic_inputs, self.device, images=images) for _ in range(2)
+        ]
         # one each: the threads that collect and learn run at once
         self.noise, self.shuffle = (torch.Generator(self.device).manual_seed(2 * seed + k) for k in range(2))
         self.statistics, self.terms = Statistics(config.num_envs), TermWatch()

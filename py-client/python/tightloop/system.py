@@ -80,7 +80,7 @@ def write_at_once(pipe: IO[bytes], data: bytes) -> int:
     """Write as much to a pipe as it takes now, and return how many bytes that is.
 
     Args:
-        pipe: The pipe, which nobody else writes to.
+        pipe: The pipe, of which this is the only writer.
         data: Bytes to write.
 
     Raises:

@@ -17,6 +17,7 @@ from gymnasium.spaces import Box
 import tightloop as tl
 from tightloop.env.commands import Commands
 from tightloop.env.controls import Control
+from tightloop.env.evaluation.observations import ObservationPacker
 from tightloop.env.names import Names
 from tightloop.env.observed import Observed
 from tightloop.env.registry import controls_of, name_of
@@ -55,7 +56,8 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
     alone = f"{robots[0]}/" if len(robots) == 1 else ""
     parts, space = observed_parts(task), envs.single_action_space
     assert isinstance(space, Box)
-    low, high = (np.concatenate([np.tile(part.bounds[end], part.history) for part in parts]) for end in (0, 1))
+    # also where the observations of the environment are dicts
+    seen = ObservationPacker(parts, task.dtype).space
     facts: dict[str, Any] = {
         "task": name_of(task),
         "tightloop_version": tl.__version__,
@@ -67,8 +69,8 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "observation_shapes": ["x".join(map(str, part.shape or (part.size,))) for part in parts],
         "observation_history": [part.history for part in parts],
         "observation_units": [part.unit for part in parts],
-        "observation_low": low.astype(task.dtype),
-        "observation_high": high.astype(task.dtype),
+        "observation_low": seen.low,
+        "observation_high": seen.high,
         "action_names": [name.removeprefix(alone) for name in _joined(controls, "value_names")],
         "action_types": [type(control).__name__ for control in controls for _ in range(control.size)],
         "action_scale": _joined(controls, "scales"),

@@ -65,7 +65,7 @@ class Viewer:
         self._process = process
         self._rest = b""  # of messages that the page did not take yet
         self._end = weakref.finalize(self, _end, process, os.getpid())
-        # it holds no viewer, so that one that nobody holds still ends
+        # it refers to the viewer weakly, so that a viewer without other references still ends
         threading.Thread(target=_listen, args=(process, weakref.ref(self)), name="viewer", daemon=True).start()
 
     @property
