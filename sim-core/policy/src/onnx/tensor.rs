@@ -2,6 +2,8 @@
 
 use std::cell::Cell;
 
+use half::f16;
+
 use super::protobuf::{Value, entry, fields};
 use crate::PolicyError;
 use crate::network::SIZE_MAX;
@@ -14,6 +16,7 @@ const FLOAT: i64 = 1;
 const INT32: i64 = 6;
 const INT64: i64 = 7;
 const BOOL: i64 = 9;
+const FLOAT16: i64 = 10;
 const DOUBLE: i64 = 11;
 
 /// A constant. Whole numbers are exact up to 2²⁴, and no shape of a policy has more.
@@ -173,6 +176,12 @@ impl<'a> Parts<'a> {
             (false, None) => match self.dtype {
                 FLOAT | DOUBLE => self.floats,
                 INT32 | INT64 | BOOL => self.integers.iter().map(|&n| n as f32).collect(),
+                // their bits, as ONNX has them
+                FLOAT16 => self
+                    .integers
+                    .iter()
+                    .map(|&n| half(n))
+                    .collect::<Result<_, _>>()?,
                 other => return Err(unknown(other)),
             },
         };
@@ -239,8 +248,16 @@ fn decoded(dtype: i64, bytes: &[u8]) -> Result<Vec<f32>, String> {
         INT32 => all(bytes, |bytes| i32::from_le_bytes(bytes) as f32),
         INT64 => all(bytes, |bytes| i64::from_le_bytes(bytes) as f32),
         BOOL => all(bytes, |[byte]| f32::from(byte)),
+        FLOAT16 => all(bytes, |bytes| f16::from_le_bytes(bytes).to_f32()),
         other => Err(unknown(other)),
     }
+}
+
+/// A number of half precision, of its bits.
+fn half(bits: i64) -> Result<f32, String> {
+    let bits = u16::try_from(bits)
+        .map_err(|_| format!("has {bits} as the bits of a float16; export the policy anew"))?;
+    Ok(f16::from_bits(bits).to_f32())
 }
 
 /// Bytes of a number.
@@ -248,6 +265,7 @@ fn bytes_of(dtype: i64) -> Result<u64, String> {
     match dtype {
         FLOAT | INT32 => Ok(4),
         DOUBLE | INT64 => Ok(8),
+        FLOAT16 => Ok(2),
         BOOL => Ok(1),
         other => Err(unknown(other)),
     }
@@ -270,7 +288,6 @@ pub(super) fn within(
 
 fn unknown(dtype: i64) -> String {
     let name = match dtype {
-        10 => "float16".to_owned(),
         16 => "bfloat16".to_owned(),
         other => format!("the type {other} of ONNX"),
     };
