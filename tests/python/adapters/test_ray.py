@@ -184,11 +184,11 @@ def test_an_actor_that_hangs_is_started_again(spread: Any) -> None:
 
 
 def test_without_free_resources_the_error_has_a_cure_and_a_new_node_helps(cluster: Any, spread: Any) -> None:
-    own = spread("CartPoleBalance", 6, num_cpus=2, launch_timeout=3.0, on=3)
+    own = spread("CartPoleBalance", 6, num_cpus=2, launch_timeout=8.0, on=3)
     own.reset(seed=0)
     kill_node(cluster, own, 2)
     actions = np.zeros((6, 1))
-    with pytest.raises(tl.LaunchError, match=r"worlds 4 to 5: .* within 3 s .* needs \{'CPU': 2.*\}: add a node"):
+    with pytest.raises(tl.LaunchError, match=r"worlds 4 to 5: .* within 8 s .* needs \{'CPU': 2.*\}: add a node"):
         while True:  # a worker may answer a moment longer than its node
             own.step(actions)
     cluster.add_node(num_cpus=2, object_store_memory=STORE)
