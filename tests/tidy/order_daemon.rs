@@ -52,14 +52,17 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/render/src",
         &[
-            "vector", "camera", "tile", "lit", "tree", "solids", "normals", "parallel", "paint",
-            "light", "field", "scene", "shadow", "shade", "image",
+            "vector", "camera", "tile", "placed", "lit", "tree", "solids", "normals", "parallel",
+            "paint", "light", "field", "scene", "shown", "shadow", "shade", "image",
         ],
     ),
-    ("sim-core/render/src/field", &["march", "normals"]),
+    (
+        "sim-core/render/src/field",
+        &["march", "normals", "open"],
+    ),
     (
         "sim-core/render/src/tree",
-        &["build", "cast", "fill", "shade", "parts"],
+        &["build", "cast", "fill", "shade", "outer", "parts"],
     ),
     (
         "sim-daemon/src/eyes",

@@ -3,27 +3,26 @@
 use sim_physics::lane::simd::widths;
 
 use crate::camera::Camera;
-use crate::scene::{Scene, Surface};
-use crate::shade::{Lights, Shown};
+use crate::light::Lights;
+use crate::placed::Placed;
+use crate::scene::{NOTHING, Scene, Surface};
 use crate::shadow::Casters;
+use crate::shown::Shown;
 use crate::tile::{EDGE, Tile};
 use crate::tree::{Bundle, Waiting, Walk};
-use crate::vector::{Frame, Vector, dot, three};
-
-/// Depths below which a corner of a box is not projected [m].
-const SMALL: f32 = 1e-6;
+use crate::vector::Frame;
 
 /// Memory that images need meanwhile: one for each thread.
 #[derive(Default)]
 pub struct Scratch {
-    /// Of all things, in the frame of the camera; of those that rest, of which something is seen.
+    /// Of all things, in the frame of the camera; of those that rest, of which something is placed.
     frames: Vec<Frame>,
     /// Those that rest, once a tile asked for them.
     resting: Vec<Resting>,
     /// Counts images, so that nothing of an earlier one is taken for one of this.
     image: u64,
     walk: Walk,
-    things: Vec<Seen>,
+    things: Vec<Placed>,
     order: Vec<u32>,
     /// Of each tile, things from the nearest to the farthest.
     tiles: Vec<Vec<u32>>,
@@ -32,32 +31,19 @@ pub struct Scratch {
     waiting: Waiting,
 }
 
-/// A thing in the frame of the camera.
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    thing: usize,
-    frame: Frame,
-    /// Least depth of its box [m].
-    near: f32,
-    /// First and last columns and rows of tiles that it may be in.
-    tiles: [[usize; 2]; 2],
-    /// First and last rows of pixels.
-    rows: [usize; 2],
-}
-
 /// A thing of the tree of those that rest, in an image.
 #[derive(Clone, Copy, Debug, Default)]
 struct Resting {
     image: u64,
-    seen: Option<Seen>,
+    placed: Option<Placed>,
 }
 
 /// Where an image goes, row by row. `(height, width)` each, if not said otherwise
 #[derive(Debug)]
 pub struct Image<'a> {
-    /// Depth along the camera's z [m]; 0 where nothing is seen.
+    /// Depth along the camera's z [m]; 0 where nothing is placed.
     pub depth: &'a mut [f32],
-    /// Labels of parts, [`crate::NOTHING`] where none is seen.
+    /// Labels of parts, [`crate::NOTHING`] where none is placed.
     pub labels: Option<&'a mut [i32]>,
     /// Red, green and blue, as a screen shows them. `(height, width, 3)`
     pub rgb: Option<&'a mut [u8]>,
@@ -126,9 +112,12 @@ impl Scratch {
         let across = camera.width.div_ceil(EDGE);
         let down = camera.height.div_ceil(EDGE);
         self.place(scene, bodies, eye, camera, [across, down]);
-        let lights = image.rgb.is_some().then(|| Lights::new(scene, eye));
-        if let Some(lights) = lights.as_ref().filter(|_| scene.light.shadows) {
-            self.casters.place(scene, &self.frames, eye, &lights.key);
+        let lights = image.rgb.is_some().then(|| Lights::new(&scene.light, eye));
+        if let Some(lights) = &lights {
+            self.shown.begin(scene.things.len());
+            if scene.light.shadows {
+                self.casters.place(scene, &self.frames, eye, &lights.key);
+            }
         }
         for row in 0..down {
             for column in 0..across {
@@ -160,7 +149,7 @@ impl Scratch {
             let frame = eye.relative(&in_world);
             self.frames.push(frame);
             self.things
-                .extend(Seen::new(number, frame, thing.half(), camera));
+                .extend(Placed::new(number, frame, thing.half(), camera));
         }
         self.order.clear();
         self.order.extend(0..self.things.len() as u32);
@@ -194,20 +183,27 @@ impl Scratch {
         let mut tile = Tile::new(camera, place);
         let across = camera.width.div_ceil(EDGE);
         for &at in &self.tiles[place[1] * across + place[0]] {
-            let seen = &self.things[at as usize];
-            if tile.farthest() < seen.near {
+            let placed = &self.things[at as usize];
+            if tile.farthest() < placed.near {
                 break;
             }
-            match &scene.things[seen.thing].surface {
+            match &scene.things[placed.thing].surface {
                 Surface::Solid { solid, .. } => {
-                    let lines = seen.lines(place[1]);
-                    solid.fill(&seen.frame, seen.thing as u32, lines, &mut tile)
+                    let lines = placed.lines(place[1]);
+                    solid.fill(&placed.frame, placed.thing as u32, lines, &mut tile)
                 }
                 Surface::Field { field, .. } => {
-                    field.fill(&seen.frame, seen.thing as u32, &mut tile)
+                    field.fill(&placed.frame, placed.thing as u32, &mut tile)
                 }
                 Surface::Triangles { tree, .. } => {
-                    tree.fill(&seen.frame, seen.thing as u32, &mut self.waiting, &mut tile);
+                    let number = placed.thing as u32;
+                    tree.fill(
+                        &placed.frame,
+                        number,
+                        placed.count(),
+                        &mut self.waiting,
+                        &mut tile,
+                    );
                 }
             }
         }
@@ -216,14 +212,16 @@ impl Scratch {
         let columns = EDGE.min(width - EDGE * place[0]);
         for line in 0..EDGE.min(height - EDGE * place[1]) {
             let start = (EDGE * place[1] + line) * width + EDGE * place[0];
-            for lane in 0..columns {
-                let is_seen = tile.things[line][lane] != Tile::NOTHING;
-                image.depth[start + lane] = if is_seen { tile.depth[line][lane] } else { 0.0 };
-            }
+            copied(&tile.depths(line), &mut image.depth[start..start + columns]);
             if let Some(to) = &mut image.labels {
                 for lane in 0..columns {
-                    to[start + lane] =
-                        scene.label(tile.things[line][lane], tile.triangles[line][lane]);
+                    let is_seen = tile.things[line][lane] != Tile::NOTHING;
+                    to[start + lane] = match is_seen {
+                        true => {
+                            scene.label(tile.things[line][lane] as usize, tile.triangle(line, lane))
+                        }
+                        false => NOTHING,
+                    };
                 }
             }
         }
@@ -238,8 +236,9 @@ impl Scratch {
             );
             for line in 0..EDGE.min(height - EDGE * place[1]) {
                 let start = (EDGE * place[1] + line) * width + EDGE * place[0];
-                let pixels = &lights.line(&tile, &self.shown, line)[..columns];
-                to[3 * start..3 * (start + columns)].copy_from_slice(pixels.as_flattened());
+                let pixels = lights.line(&tile, &self.shown, line);
+                let to = to[3 * start..3 * (start + columns)].as_chunks_mut().0;
+                copied(&pixels, to);
             }
         }
     }
@@ -268,79 +267,29 @@ impl Scratch {
                     self.frames[number] = frame;
                     self.resting[number] = Resting {
                         image: self.image,
-                        seen: Seen::new(number, frame, thing.half(), camera),
+                        placed: Placed::new(number, frame, thing.half(), camera),
                     };
                 }
-                let Some(seen) = &self.resting[number].seen else {
+                let Some(placed) = &self.resting[number].placed else {
                     continue;
                 };
-                let [columns, rows] = seen.tiles;
+                let [columns, rows] = placed.tiles;
                 let is_here = (columns[0]..=columns[1]).contains(&place[0])
                     && (rows[0]..=rows[1]).contains(&place[1]);
                 if let (true, Surface::Solid { solid, .. }) = (is_here, &thing.surface) {
-                    solid.fill(&seen.frame, number as u32, seen.lines(place[1]), tile);
+                    solid.fill(&placed.frame, number as u32, placed.lines(place[1]), tile);
                 }
             }
         }
     }
 }
 
-impl Seen {
-    /// A thing in a box about the origin of its frame; none where it is behind the camera or beside the image.
-    #[inline(always)]
-    fn new(thing: usize, frame: Frame, half: Vector, camera: &Camera) -> Option<Seen> {
-        let pixels = [camera.width, camera.height];
-        let mut seen = Seen {
-            thing,
-            frame,
-            near: camera.near,
-            tiles: pixels.map(|count| [0, (count - 1) / EDGE]),
-            rows: [0, camera.height - 1],
-        };
-        if half.iter().any(|x| x.is_infinite()) {
-            return Some(seen);
-        }
-        let reach = dot(three!(k => frame.rot[2][k].abs()), half);
-        let (near, far) = (frame.pos[2] - reach, frame.pos[2] + reach);
-        if far < camera.near || near > camera.far {
-            return None;
-        }
-        if near < SMALL {
-            return Some(seen);
-        }
-        seen.near = near;
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for corner in 0..8 {
-            let side = three!(k => if corner >> k & 1 == 0 { -half[k] } else { half[k] });
-            let turned = frame.turn(side);
-            let [x, y, z] = three!(k => frame.pos[k] + turned[k]);
-            let place = [x / z, y / z];
-            for k in 0..2 {
-                low[k] = low[k].min(place[k]);
-                high[k] = high[k].max(place[k]);
-            }
-        }
-        for k in 0..2 {
-            // a pixel more on each side than the middles of pixels inside
-            let first = low[k].mul_add(camera.focal[k], camera.center[k]) - 1.0;
-            let last = high[k].mul_add(camera.focal[k], camera.center[k]) + 1.0;
-            if last < 0.0 || first > pixels[k] as f32 {
-                return None;
-            }
-            let range = [first, last].map(|pixel| (pixel.max(0.0) as usize).min(pixels[k] - 1));
-            seen.tiles[k] = range.map(|pixel| pixel / EDGE);
-            if k == 1 {
-                seen.rows = range;
-            }
-        }
-        Some(seen)
-    }
-
-    /// Lines of a row of tiles that it may be in.
-    #[inline(always)]
-    fn lines(&self, row: usize) -> std::ops::Range<usize> {
-        let start = EDGE * row;
-        let last = self.rows[1].min(start + EDGE - 1);
-        self.rows[0].saturating_sub(start)..(last + 1).saturating_sub(start)
+/// Copies the pixels of a line that are in the image.
+#[inline(always)]
+fn copied<T: Copy>(from: &[T; EDGE], to: &mut [T]) {
+    match to.first_chunk_mut() {
+        // of a length that the compiler knows
+        Some(whole) => *whole = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
     }
 }

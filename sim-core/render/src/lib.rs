@@ -1,7 +1,8 @@
 //! Images of cameras in many worlds: rays against the shapes of a model, on the CPU.
 //!
 //! scene (what is seen, per body) → image (tiles, and what each may see) → tree, field and solids (where rays meet it) →
-//! shade (in what light), with shadow (which points of a tile, in the frame of the light, see it)
+//! shown (colours, and what light falls on them), shade (the pixels), with shadow (which points of a tile, in the frame of
+//! the light, see it)
 //!
 //! An image depends on its world alone: its bits are the same for any number of worlds and threads.
 
@@ -13,9 +14,11 @@ mod lit;
 mod normals;
 mod paint;
 mod parallel;
+mod placed;
 mod scene;
 mod shade;
 mod shadow;
+mod shown;
 mod solids;
 mod tile;
 mod tree;

@@ -10,7 +10,7 @@
 
 use sim_model::geometry::vector::{Vector as Point, cross, dot};
 
-use crate::vector::Frame;
+use crate::vector::{Frame, Vector};
 
 /// Where the key light comes from, in the world.
 const KEY: [f64; 3] = [0.33, -0.52, 0.79];
@@ -71,6 +71,30 @@ impl KeyLight {
             },
             shadows: true,
         })
+    }
+}
+
+/// Lights as a camera sees them.
+pub(crate) struct Lights {
+    /// The frame of the key light, at the camera; its z points to where the light comes from.
+    pub(crate) key: Frame,
+    /// Up in the world.
+    pub(crate) up: Vector,
+    pub(crate) shadows: bool,
+}
+
+impl Lights {
+    #[inline(always)]
+    pub(crate) fn new(light: &KeyLight, eye: &Frame) -> Lights {
+        let at_eye = Frame {
+            pos: eye.pos,
+            ..light.axes
+        };
+        Lights {
+            key: eye.relative(&at_eye),
+            up: eye.rot[2],
+            shadows: light.shadows,
+        }
     }
 }
 

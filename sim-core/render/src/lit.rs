@@ -7,7 +7,7 @@ use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::tile::EDGE;
-use crate::vector::two;
+use crate::vector::{each, two};
 
 /// By how much rays begin nearer to the light, relative to the depth: more than the rounding of places.
 const AHEAD: f32 = 2e-5;
@@ -108,7 +108,7 @@ impl Columns {
 fn least(x: F32x8) -> f32 {
     let mut lanes = [0.0; EDGE];
     x.store(&mut lanes);
-    let [a, b, c, d] = [0, 1, 2, 3].map(|k: usize| lanes[k].min(lanes[k + 4]));
+    let [a, b, c, d] = each!(k in 0 1 2 3 => lanes[k].min(lanes[k + 4]));
     a.min(b).min(c.min(d))
 }
 
@@ -158,39 +158,38 @@ impl Few {
 
     #[inline(always)]
     pub(crate) fn gather(&mut self, lit: &Lit, chosen: &[u32; EDGE]) {
-        self.count = 0;
+        const NONE: [[f32; 2]; 2] = [[f32::INFINITY, f32::NEG_INFINITY]; 2];
+        (self.count, self.all, self.deep) = (0, NONE, f32::INFINITY);
+        let mut ends = NONE;
         for line in 0..EDGE {
             let mut bits = chosen[line];
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize & (EDGE - 1);
                 bits &= bits - 1;
-                let place = self.count % EDGE;
-                let group = &mut self.groups[self.count / EDGE % EDGE];
+                let (at, place) = (self.count / EDGE % EDGE, self.count % EDGE);
+                let group = &mut self.groups[at];
                 let point = [lit.a[line][lane], lit.b[line][lane], lit.c[line][lane]];
                 if place == 0 {
                     // what is behind the last point is as the first, and shaded
                     *group = [[point[0]; EDGE], [point[1]; EDGE], [f32::INFINITY; EDGE]];
+                    ends = NONE;
                 }
                 for k in 0..3 {
                     group[k][place] = point[k];
                 }
+                ends = two!(k => [ends[k][0].min(point[k]), ends[k][1].max(point[k])]);
+                self.deep = self.deep.min(point[2]);
+                self.bounds[at] = ends;
                 self.places[self.count % (EDGE * EDGE)] = (EDGE * line + lane) as u8;
                 self.count += 1;
             }
         }
-        (self.all, self.deep) = ([[f32::INFINITY, f32::NEG_INFINITY]; 2], f32::INFINITY);
         for group in 0..self.in_use() {
-            let [a, b, c] = &self.groups[group];
-            let ends = two!(k => {
-                let places = F32x8::load([a, b][k]);
-                [least(places), -least(-places)]
-            });
-            for k in 0..2 {
-                let [low, high] = self.all[k];
-                self.all[k] = [low.min(ends[k][0]), high.max(ends[k][1])];
-            }
-            self.deep = self.deep.min(least(F32x8::load(c)));
-            self.bounds[group] = ends;
+            let ends = self.bounds[group];
+            self.all = two!(k => [
+                self.all[k][0].min(ends[k][0]),
+                self.all[k][1].max(ends[k][1]),
+            ]);
         }
     }
 

@@ -9,15 +9,6 @@ use crate::vector::{Frame, Vector, each, three};
 /// Coordinates of eight points or directions.
 pub(crate) type Points = [F32x8; 3];
 
-/// A direction of a frame, in its parent's.
-#[inline(always)]
-pub(crate) fn turned(frame: &Frame, v: &Points) -> Points {
-    three!(k => {
-        let row = &frame.rot[k];
-        v[2].fma(F32x8::k(row[2]), v[1].fma(F32x8::k(row[1]), v[0] * F32x8::k(row[0])))
-    })
-}
-
 /// A direction of its parent's frame, in this one.
 #[inline(always)]
 pub(crate) fn turned_back(frame: &Frame, v: &Points) -> Points {

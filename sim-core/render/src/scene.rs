@@ -82,6 +82,8 @@ pub(crate) struct Face {
     /// Length 1.
     pub(crate) normal: Vector,
     pub(crate) tone: u32,
+    /// Whether nothing of the body is in front of its plane, so that the body does not shade it.
+    pub(crate) is_outer: bool,
 }
 
 /// Parts of all bodies, those of triangles joined per body, and the light on them.
@@ -97,6 +99,9 @@ pub struct Scene {
 
 impl Scene {
     /// The scene of these parts, in the light of films. Those whose [`Paint`] is transparent are left out.
+    ///
+    /// # Panics
+    /// More than 2²⁴ parts.
     pub fn new(parts: &[Part]) -> Scene {
         let mut things = Vec::new();
         let mut meshes: Vec<Joined> = Vec::new();
@@ -140,6 +145,7 @@ impl Scene {
             }
         }
         things.extend(meshes.into_iter().map(Joined::thing));
+        assert!(things.len() < 1 << 24, "tiles have their numbers as floats");
         // the order of others stays
         things.sort_by_key(|thing| thing.box_at_rest().is_none());
         let boxes: Vec<[Point; 2]> = things.iter().map_while(Thing::box_at_rest).collect();
@@ -149,27 +155,34 @@ impl Scene {
             .filter_map(|part| part.body)
             .max()
             .map_or(0, |last| last + 1);
-        Scene {
+        let scene = Scene {
             things,
             light: KeyLight::default(),
             resting,
             tree: (resting > 0).then(|| PartTree::new(&boxes)),
             bodies,
-        }
+        };
+        scene.lit_by(KeyLight::default())
     }
 
     /// The same scene in another light.
-    pub fn lit_by(self, light: KeyLight) -> Scene {
-        Scene { light, ..self }
+    pub fn lit_by(mut self, light: KeyLight) -> Scene {
+        self.light = light;
+        let towards = light.axes.rot.map(|row| row[2]);
+        for thing in self.things.iter_mut().filter(|thing| thing.body.is_none()) {
+            if let Surface::Field { field, .. } = &mut thing.surface {
+                field.open_to(thing.frame.turn_back(towards));
+            }
+        }
+        self
     }
 
-    /// The label of what a pixel sees.
+    /// The label of a thing that a pixel sees.
     #[inline(always)]
-    pub(crate) fn label(&self, thing: u32, triangle: u32) -> i32 {
-        match self.things.get(thing as usize).map(|thing| &thing.surface) {
-            Some(Surface::Solid { label, .. } | Surface::Field { label, .. }) => *label,
-            Some(Surface::Triangles { labels, .. }) => labels[triangle as usize],
-            None => NOTHING,
+    pub(crate) fn label(&self, thing: usize, triangle: u32) -> i32 {
+        match &self.things[thing].surface {
+            Surface::Solid { label, .. } | Surface::Field { label, .. } => *label,
+            Surface::Triangles { labels, .. } => labels[triangle as usize],
         }
     }
 
@@ -218,7 +231,8 @@ impl Joined {
             pos: center,
             ..Frame::IDENTITY
         };
-        let faces = self.triangles.iter().zip(&self.chosen);
+        let outer = tree.outer(&self.triangles, center);
+        let faces = self.triangles.iter().zip(&self.chosen).zip(outer);
         Thing {
             body: self.body,
             frame,
@@ -226,9 +240,10 @@ impl Joined {
                 tree,
                 labels: self.labels,
                 faces: faces
-                    .map(|(corners, &tone)| Face {
+                    .map(|((corners, &tone), is_outer)| Face {
                         normal: normal(corners),
                         tone,
+                        is_outer,
                     })
                     .collect(),
                 tones: self.tones,

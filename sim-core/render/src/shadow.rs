@@ -10,8 +10,9 @@ use crate::lit::{Few, Lit};
 use crate::normals::{mask, turned_back};
 use crate::parallel::Slabs;
 use crate::scene::{Scene, Surface};
+use crate::shown::Shown;
 use crate::solids::Solid;
-use crate::tile::EDGE;
+use crate::tile::{EDGE, Tile};
 use crate::tree::{Beam, Waiting, Walk};
 use crate::vector::{Frame, Vector, dot, three};
 
@@ -34,6 +35,8 @@ struct Caster {
 /// What casts shadows.
 pub(crate) struct Casters {
     all: Vec<Caster>,
+    /// Least and largest a and b of eight of them, and the largest c: a group that is not full ends with none.
+    bounds: Vec<[[f32; EDGE]; 5]>,
     /// Those that rest, once a tile asked for them, and the image that it was in.
     resting: Vec<(u64, Option<Caster>)>,
     image: u64,
@@ -132,6 +135,7 @@ impl Default for Casters {
     fn default() -> Casters {
         Casters {
             all: Vec::new(),
+            bounds: Vec::new(),
             resting: Vec::new(),
             image: 0,
             walk: Walk::default(),
@@ -154,23 +158,47 @@ impl Casters {
             self.all
                 .extend(Caster::new(scene, thing, light.relative(frame)));
         }
+        self.bounds.clear();
+        for group in self.all.chunks(EDGE) {
+            let mut bounds = [[f32::NEG_INFINITY; EDGE]; 5];
+            for (lane, caster) in group.iter().enumerate() {
+                let ([low_a, low_b], [high_a, high_b]) = (caster.low, caster.high);
+                let numbers = [low_a, low_b, high_a, high_b, caster.top];
+                for k in 0..5 {
+                    bounds[k][lane] = numbers[k];
+                }
+            }
+            self.bounds.push(bounds);
+        }
     }
 
     /// Shades the points of a tile.
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
-    pub(crate) fn shade(&mut self, scene: &Scene, waiting: &mut Waiting, lit: &mut Lit) {
-        let Some(columns) = lit.columns() else {
+    pub(crate) fn shade(
+        &mut self,
+        scene: &Scene,
+        waiting: &mut Waiting,
+        tile: &Tile,
+        shown: &mut Shown,
+    ) {
+        let Some(columns) = shown.lit.columns() else {
             return;
         };
-        for caster in &self.all {
-            if columns.are_below(caster.low, caster.high, caster.top) {
-                self.below.shade(scene, caster, columns.lines, waiting, lit);
+        let (ends, deep) = columns.all();
+        for (bounds, casters) in self.bounds.iter().zip(self.all.chunks(EDGE)) {
+            let mut bits = are_over(bounds, &ends, deep);
+            while bits != 0 {
+                let caster = &casters[bits.trailing_zeros() as usize & (EDGE - 1)];
+                bits &= bits - 1;
+                if columns.are_below(caster.low, caster.high, caster.top) {
+                    self.below
+                        .shade(scene, caster, columns.lines, waiting, tile, shown);
+                }
             }
         }
         let Some(tree) = &scene.tree else {
             return;
         };
-        let (ends, deep) = columns.all();
         let world = self.light.relative(&self.eye.relative(&Frame::IDENTITY));
         let beam = Beam::new(&world, tree.slack_in(&world), ends, deep);
         self.walk.start();
@@ -185,7 +213,8 @@ impl Casters {
                     continue;
                 };
                 if columns.are_below(caster.low, caster.high, caster.top) {
-                    self.below.shade(scene, caster, columns.lines, waiting, lit);
+                    self.below
+                        .shade(scene, caster, columns.lines, waiting, tile, shown);
                 }
             }
         }
@@ -202,13 +231,23 @@ impl Below {
         caster: &Caster,
         mut lines: u32,
         waiting: &mut Waiting,
-        lit: &mut Lit,
+        tile: &Tile,
+        shown: &mut Shown,
     ) {
         self.lines = [0; EDGE];
+        let number = caster.thing as f32;
+        let lit = &mut shown.lit;
         while lines != 0 {
             let line = lines.trailing_zeros() as usize & (EDGE - 1);
             lines &= lines - 1;
-            let is_below = caster.is_over(lit, line);
+            let own_part = shown.outer[line] & F32x8::bits(tile.sees(line, number));
+            if own_part == 0xff {
+                continue;
+            }
+            let mut is_below = caster.is_over(lit, line);
+            if own_part != 0 {
+                is_below = is_below & !mask(own_part);
+            }
             if !F32x8::any(is_below) {
                 continue;
             }
@@ -237,6 +276,18 @@ impl Below {
             self.few.scatter(lit);
         }
     }
+}
+
+/// Which of eight casters may be over points between two a and two b, from a c on: bits.
+#[inline(always)]
+fn are_over(bounds: &[[f32; EDGE]; 5], [a, b]: &[[f32; 2]; 2], deep: f32) -> u32 {
+    let [low_a, low_b, high_a, high_b, top] = bounds;
+    let is_over = F32x8::load(low_a).lt(F32x8::k(a[1]))
+        & F32x8::k(a[0]).lt(F32x8::load(high_a))
+        & F32x8::load(low_b).lt(F32x8::k(b[1]))
+        & F32x8::k(b[0]).lt(F32x8::load(high_b))
+        & F32x8::k(deep).lt(F32x8::load(top));
+    F32x8::bits(is_over)
 }
 
 /// How far a box with these half edges reaches along a direction in its frame.

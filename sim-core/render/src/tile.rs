@@ -4,7 +4,7 @@ use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
 use crate::camera::Camera;
-use crate::vector::{Frame, three};
+use crate::vector::{Frame, each, three};
 
 /// Pixels along an edge of a tile.
 pub(crate) const EDGE: usize = 8;
@@ -17,14 +17,16 @@ pub(crate) struct Tile {
     pub(crate) near: f32,
     /// Depths [m]; the largest that is seen, where nothing is met.
     pub(crate) depth: [[f32; EDGE]; EDGE],
-    /// Numbers of things, and of their triangles.
-    pub(crate) things: [[u32; EDGE]; EDGE],
-    pub(crate) triangles: [[u32; EDGE]; EDGE],
+    /// Numbers of things, of which a scene has less than 2²⁴.
+    pub(crate) things: [[f32; EDGE]; EDGE],
+    /// Where on them: bits of the number of a triangle, which are only copied and never computed with, or a place of a
+    /// field.
+    pub(crate) places: [[f32; EDGE]; EDGE],
 }
 
 impl Tile {
     /// No thing.
-    pub(crate) const NOTHING: u32 = u32::MAX;
+    pub(crate) const NOTHING: f32 = -1.0;
 
     #[inline(always)]
     pub(crate) fn new(camera: &Camera, place: [usize; 2]) -> Tile {
@@ -40,7 +42,7 @@ impl Tile {
             near: camera.near,
             depth: [[camera.far; EDGE]; EDGE],
             things: [[Tile::NOTHING; EDGE]; EDGE],
-            triangles: [[0; EDGE]; EDGE],
+            places: [[0.0; EDGE]; EDGE],
         }
     }
 
@@ -53,8 +55,17 @@ impl Tile {
         }
         let mut lanes = [0.0; EDGE];
         most.store(&mut lanes);
-        let [a, b, c, d] = [0, 1, 2, 3].map(|k: usize| lanes[k].max(lanes[k + 4]));
+        let [a, b, c, d] = each!(k in 0 1 2 3 => lanes[k].max(lanes[k + 4]));
         a.max(b).max(c.max(d))
+    }
+
+    /// Depths of a line; 0 where nothing is seen.
+    #[inline(always)]
+    pub(crate) fn depths(&self, line: usize) -> [f32; EDGE] {
+        let mut depths = [0.0; EDGE];
+        let depth = F32x8::load(&self.depth[line]);
+        F32x8::select(self.is_seen(line), depth, F32x8::k(0.0)).store(&mut depths);
+        depths
     }
 
     /// Directions of the rays of a line.
@@ -71,6 +82,19 @@ impl Tile {
         three!(k => F32x8::k(rot[0][k]).fma(x, F32x8::k(rot[1][k].mul_add(self.y[line], rot[2][k]))))
     }
 
+    /// Which rays of a line see something.
+    #[inline(always)]
+    pub(crate) fn is_seen(&self, line: usize) -> <F32x8 as Num>::Mask {
+        F32x8::k(Tile::NOTHING).lt(F32x8::load(&self.things[line]))
+    }
+
+    /// Which rays of a line see a thing.
+    #[inline(always)]
+    pub(crate) fn sees(&self, line: usize, thing: f32) -> <F32x8 as Num>::Mask {
+        let (things, thing) = (F32x8::load(&self.things[line]), F32x8::k(thing));
+        !(things.lt(thing) | thing.lt(things))
+    }
+
     /// Keeps what the rays of a line meet, where that is nearer.
     #[inline(always)]
     pub(crate) fn keep(
@@ -81,10 +105,11 @@ impl Tile {
         thing: u32,
         triangle: u32,
     ) {
-        self.keep_each(line, depth, is_met, thing, &[triangle; EDGE]);
+        let triangle = F32x8::k(f32::from_bits(triangle));
+        self.keep_each(line, depth, is_met, thing, triangle);
     }
 
-    /// The same, of a triangle for each ray.
+    /// The same, of a place for each ray.
     #[inline(always)]
     pub(crate) fn keep_each(
         &mut self,
@@ -92,17 +117,34 @@ impl Tile {
         depth: F32x8,
         is_met: <F32x8 as Num>::Mask,
         thing: u32,
-        triangles: &[u32; EDGE],
+        places: F32x8,
     ) {
         let before = F32x8::load(&self.depth[line]);
         let is_met = is_met & depth.lt(before) & F32x8::k(self.near).lt(depth);
         F32x8::select(is_met, depth, before).store(&mut self.depth[line]);
-        let mut bits = F32x8::bits(is_met);
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize & (EDGE - 1);
-            bits &= bits - 1;
-            self.things[line][lane] = thing;
-            self.triangles[line][lane] = triangles[lane];
-        }
+        let things = F32x8::load(&self.things[line]);
+        F32x8::select(is_met, F32x8::k(thing as f32), things).store(&mut self.things[line]);
+        let others = F32x8::load(&self.places[line]);
+        F32x8::select(is_met, places, others).store(&mut self.places[line]);
+    }
+
+    /// Keeps what one ray meets, which is nearer.
+    #[inline(always)]
+    pub(crate) fn keep_one(
+        &mut self,
+        [line, lane]: [usize; 2],
+        depth: f32,
+        thing: u32,
+        triangle: u32,
+    ) {
+        self.depth[line][lane] = depth;
+        self.things[line][lane] = thing as f32;
+        self.places[line][lane] = f32::from_bits(triangle);
+    }
+
+    /// The number of the triangle that a ray meets.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, line: usize, lane: usize) -> u32 {
+        self.places[line][lane].to_bits()
     }
 }

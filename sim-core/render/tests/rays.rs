@@ -2,10 +2,12 @@
 
 mod random;
 
+use std::sync::Arc;
+
 use fastrand::Rng;
 use random::{Seen, field, frame, part, rotation};
 use sim_model::Pose;
-use sim_model::geometry::Shape;
+use sim_model::geometry::{Shape, TriMesh};
 use sim_render::{Camera, Frame, Image, Look, NOTHING, Paint, Part, Scene, Scratch, draw};
 
 /// Distances of surfaces along a ray from which on the nearer one is certain [m].
@@ -179,4 +181,55 @@ fn depths_and_labels_are_those_of_rays_in_double_precision() {
     assert!(seen_pixels > 10_000);
     // edges and rays along surfaces
     assert!(wrong * 1000 < pixels, "{wrong} of {pixels}");
+}
+
+/// So many triangles in few pixels are met ray by ray, those in the middle along two sides of the box around them.
+#[test]
+fn a_dense_mesh_is_seen_by_rays_along_its_axes() {
+    let Some(draw) = draw() else {
+        return;
+    };
+    const CELLS: usize = 80;
+    let mut mesh = TriMesh::default();
+    let corner = |place: usize| place as f64 / CELLS as f64 - 0.5;
+    for place in 0..(CELLS + 1) * (CELLS + 1) {
+        let [x, y] = [place % (CELLS + 1), place / (CELLS + 1)].map(corner);
+        mesh.vertices.push([x, y, 0.1 * x * y]);
+    }
+    for place in 0..CELLS * CELLS {
+        let first = place / CELLS * (CELLS + 1) + place % CELLS;
+        let [a, b, c, d] = [0, 1, CELLS + 1, CELLS + 2].map(|k| (first + k) as u32);
+        // seen from below
+        mesh.triangles.extend([[a, d, b], [a, c, d]]);
+    }
+    let part = Part {
+        body: None,
+        pose: Pose::at([0.0, 0.0, 2.0]),
+        look: Look::Triangles(Arc::new(mesh)),
+        label: 3,
+        paint: Paint::PLAIN,
+    };
+    let scene = Scene::new(&[part]);
+    let camera = Camera::with_fov(5, 5, 0.3, 10.0);
+    let (mut depth, mut labels) = (vec![0.0; 25], vec![7; 25]);
+    let mut image = Image {
+        depth: &mut depth,
+        labels: Some(&mut labels),
+        rgb: None,
+    };
+    let eye = frame(&Pose::identity());
+    draw(
+        &scene,
+        &[],
+        &eye,
+        &camera,
+        &mut Scratch::default(),
+        &mut image,
+    );
+    assert_eq!(labels, [3; 25]);
+    assert!(
+        depth.iter().all(|depth| (depth - 2.0).abs() < 0.03),
+        "{depth:?}"
+    );
+    assert!((depth[12] - 2.0).abs() < 1e-6, "{}", depth[12]);
 }

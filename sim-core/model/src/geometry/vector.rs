@@ -9,6 +9,7 @@ pub(super) fn add(a: Vector, b: Vector) -> Vector {
 }
 
 /// a - b.
+#[inline]
 pub fn sub(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
@@ -18,11 +19,13 @@ pub(super) fn scale(a: Vector, s: f64) -> Vector {
 }
 
 /// a · b.
+#[inline]
 pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// a × b.
+#[inline]
 pub fn cross(a: Vector, b: Vector) -> Vector {
     [
         a[1] * b[2] - a[2] * b[1],

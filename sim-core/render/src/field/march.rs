@@ -3,7 +3,7 @@
 use sim_physics::lane::simd::F32x8;
 use sim_physics::lane::{Lane, Num};
 
-use super::{BLOCK, Field};
+use super::{BLOCK, Field, placed};
 use crate::normals::Points;
 use crate::tile::{EDGE, Tile};
 use crate::vector::{Frame, Vector, three, two};
@@ -37,14 +37,8 @@ impl Field {
             if !F32x8::any(is_met) {
                 continue;
             }
-            let (mut cells, mut seconds) = ([0.0; EDGE], [0.0; EDGE]);
-            met.cell.store(&mut cells);
-            met.second.store(&mut seconds);
-            let mut numbers = [0; EDGE];
-            for lane in 0..EDGE {
-                numbers[lane] = 2 * cells[lane] as u32 + seconds[lane] as u32;
-            }
-            tile.keep_each(line, met.far, is_met, thing, &numbers);
+            let places = placed(met.cell, met.second);
+            tile.keep_each(line, met.far, is_met, thing, places);
         }
     }
 
@@ -149,7 +143,8 @@ impl Field {
                     break;
                 }
             }
-            // cells, until no ray is in its block
+            // cells, until no ray is in its block. Those that left theirs go on meanwhile: where they pass over corners may
+            // depend on the other rays of the line, which are of the same image
             let mut inside = active;
             while F32x8::any(inside) {
                 let exits = two!(k => (cell[k] + ahead[k] - g[k]) * inverse[k]);
@@ -157,20 +152,19 @@ impl Field {
                 let lowest = t.fma(e[2], g[2]).min(exit.fma(e[2], g[2]));
                 let place = cell[1].fma(F32x8::k(self.cells[0] as f32), cell[0]);
                 let top = F32x8::gather(&self.cell_tops, place);
-                let is_near = inside & !top.lt(lowest - slack);
+                let is_near = active & !top.lt(lowest - slack);
                 if F32x8::any(is_near) {
                     let far = self.meet(&mut met, [&g, &e], &cell, [t, exit], slack, is_near);
                     let is_met = is_near & far.lt(end);
                     active = active & !is_met;
-                    inside = inside & !is_met;
                     met.cell = F32x8::select(is_met, place, met.cell);
                     met.far = F32x8::select(is_met, far, met.far);
                 }
-                t = F32x8::select(inside, exit, t);
+                t = F32x8::select(active, exit, t);
                 let by_x = exits[0].lt(exits[1]);
-                cell[0] = F32x8::select(inside & by_x, cell[0] + step[0], cell[0]);
-                cell[1] = F32x8::select(inside & !by_x, cell[1] + step[1], cell[1]);
-                active = active & (!inside | self.holds(&cell) & t.lt(end));
+                cell[0] = F32x8::select(active & by_x, cell[0] + step[0], cell[0]);
+                cell[1] = F32x8::select(active & !by_x, cell[1] + step[1], cell[1]);
+                active = active & self.holds(&cell) & t.lt(end);
                 let low = two!(k => block[k] * size);
                 let is_here = two!(k => !cell[k].lt(low[k]) & cell[k].lt(low[k] + size));
                 inside = inside & active & is_here[0] & is_here[1];

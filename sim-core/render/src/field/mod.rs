@@ -9,11 +9,16 @@
 
 mod march;
 mod normals;
+mod open;
 
 use sim_model::geometry::HeightField;
+use sim_physics::lane::simd::F32x8;
+use sim_physics::lane::{Lane, Num};
 
+use crate::normals::Points;
 use crate::paint::{Color, Paint};
-use crate::vector::Vector;
+use crate::tile::EDGE;
+use crate::vector::{Vector, three};
 
 /// Cells along an edge of a block.
 const BLOCK: usize = 8;
@@ -38,6 +43,21 @@ pub(crate) struct Field {
     /// Colours of triangles, two of each cell, and then that of walls.
     tones: Vec<Color>,
     chosen: Vec<u8>,
+    /// Cells from which nothing of the field hides the light; none if that is not known.
+    open: Vec<bool>,
+}
+
+/// Places in a tile: numbers of cells, or of walls after them, from 1 on; negative for the second triangle of a cell.
+#[inline(always)]
+fn placed(cell: F32x8, second: F32x8) -> F32x8 {
+    let place = cell + F32x8::k(1.0);
+    F32x8::select(F32x8::k(0.5).lt(second), -place, place)
+}
+
+/// The number of a triangle, two of each cell, from its place in a tile.
+#[inline(always)]
+fn number(place: f32) -> usize {
+    2 * (place.abs() - 1.0) as usize + usize::from(place < 0.0)
 }
 
 impl Field {
@@ -115,18 +135,26 @@ impl Field {
             blocks_across: blocks[0],
             tones,
             chosen,
+            open: Vec::new(),
         };
         (field, center)
     }
 
-    /// The colour of a triangle or wall.
+    /// Colours of triangles and walls, by their places in a tile, and which are of open cells: bits.
     #[inline(always)]
-    pub(crate) fn tone(&self, number: u32) -> Color {
-        let last = self.tones.len() - 1;
-        let chosen = self
-            .chosen
-            .get(number as usize)
-            .map(|&tone| usize::from(tone));
-        self.tones[chosen.unwrap_or(last)]
+    pub(crate) fn colors(&self, places: &[f32; EDGE]) -> (Points, u32) {
+        let (mut colors, mut open, last) = ([[0.0; EDGE]; 3], 0, self.tones.len() - 1);
+        for lane in 0..EDGE {
+            let number = number(places[lane]);
+            let tone = match self.chosen.get(number) {
+                Some(&tone) => self.tones[usize::from(tone)],
+                None => self.tones[last],
+            };
+            for k in 0..3 {
+                colors[k][lane] = tone[k];
+            }
+            open |= u32::from(self.open.get(number / 2) == Some(&true)) << lane;
+        }
+        (three!(k => F32x8::load(&colors[k])), open)
     }
 }

@@ -92,9 +92,9 @@ impl Tree {
                 while bits != 0 {
                     let lane = bits.trailing_zeros() as usize & 7;
                     bits &= bits - 1;
-                    // the nearest child ends on top
+                    // the nearest child ends on top, if it matters
                     let mut place = waiting;
-                    while place > first && stack[place - 1].0 < near[lane] {
+                    while !ANY && place > first && stack[place - 1].0 < near[lane] {
                         stack[place] = stack[place - 1];
                         place -= 1;
                     }

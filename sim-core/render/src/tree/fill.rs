@@ -44,22 +44,30 @@ pub(crate) struct Bundle {
 }
 
 impl Tree {
-    /// Shows its triangles, of number `thing`, in a tile.
+    /// Shows its triangles, of number `thing`, in a tile, one of `tiles` that they may be in.
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma,bmi1,bmi2"))]
-    pub(crate) fn fill(&self, frame: &Frame, thing: u32, waiting: &mut Waiting, tile: &mut Tile) {
+    pub(crate) fn fill(
+        &self,
+        frame: &Frame,
+        thing: u32,
+        tiles: usize,
+        waiting: &mut Waiting,
+        tile: &mut Tile,
+    ) {
         if self.nodes.is_empty() {
             return;
         }
         let origin = self.origin_at(frame.turn_back(three!(k => -frame.pos[k])));
-        let bundle = Bundle::new(frame, &origin, tile);
-        if !self.leaves_of(&bundle, waiting, tile.farthest()) {
+        // of leaves that half show their back, a tile has too many for sure
+        let are_few = self.leaves.len() <= 2 * LEAVES_MAX * tiles;
+        if !are_few || !self.leaves_of(&Bundle::new(frame, &origin, tile), waiting, tile.farthest())
+        {
             self.fill_by_ray(frame, &origin, thing, waiting, tile);
             return;
         }
         let mut farthest = f32::INFINITY;
         for &(near, leaf) in &waiting.near {
-            if near < farthest {
-                self.leaves[leaf as usize].fill(frame, &origin, thing, tile);
+            if near < farthest && self.leaves[leaf as usize].fill(frame, &origin, thing, tile) {
                 farthest = tile.farthest();
             }
         }
@@ -86,14 +94,11 @@ impl Tree {
                 } else if leaves.len() == LEAVES_MAX {
                     return false;
                 } else {
-                    let place = leaves
-                        .iter()
-                        .rposition(|other| other.0 <= near)
-                        .map_or(0, |before| before + 1);
-                    leaves.insert(place, (near, child & !LEAF));
+                    leaves.push((near, child & !LEAF));
                 }
             }
         }
+        leaves.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         true
     }
 
@@ -108,22 +113,40 @@ impl Tree {
     ) {
         for line in 0..EDGE {
             let d = tile.directions(frame, line);
+            let mut bits = self.may_meet(origin, &d, F32x8::load(&tile.depth[line]));
             let mut lanes = [[0.0; EDGE]; 3];
             for k in 0..3 {
                 d[k].store(&mut lanes[k]);
             }
-            for lane in 0..EDGE {
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize & (EDGE - 1);
+                bits &= bits - 1;
                 let direction = three!(k => lanes[k][lane]);
                 let limit = tile.depth[line][lane];
                 if let Some(met) =
                     self.cast(&mut waiting.stack, origin, direction, tile.near, limit)
                 {
-                    tile.depth[line][lane] = met.far;
-                    tile.things[line][lane] = thing;
-                    tile.triangles[line][lane] = met.number;
+                    tile.keep_one([line, lane], met.far, thing, met.number);
                 }
             }
         }
+    }
+
+    /// Which rays meet the box around all triangles before a limit, in units of their directions: bits.
+    #[inline(always)]
+    fn may_meet(&self, origin: &Origin, d: &[F32x8; 3], limit: F32x8) -> u32 {
+        let (mut enter, mut leave) = (F32x8::k(0.0), limit);
+        for k in 0..3 {
+            // along a side, far away and not at a NaN
+            let tiny = F32x8::k(1e-18);
+            let along = F32x8::select(d[k].abs().lt(tiny), tiny, d[k]);
+            let (half, pos) = (self.half[k] + origin.slack, origin.pos[k]);
+            let a = F32x8::k(-half - pos).div(along);
+            let b = F32x8::k(half - pos).div(along);
+            enter = a.min(b).max(enter);
+            leave = a.max(b).min(leave);
+        }
+        F32x8::bits(!leave.lt(enter))
     }
 }
 
@@ -205,11 +228,13 @@ struct Drawn {
 }
 
 impl Leaf {
+    /// Shows its triangles in a tile; true if any is seen.
     #[inline(always)]
-    fn fill(&self, frame: &Frame, origin: &Origin, thing: u32, tile: &mut Tile) {
+    fn fill(&self, frame: &Frame, origin: &Origin, thing: u32, tile: &mut Tile) -> bool {
         let Some((drawn, front)) = self.seen_from(frame, origin) else {
-            return;
+            return false;
         };
+        let mut is_any = false;
         let x = F32x8::load(&tile.x);
         let bounds = drawn.bounds([tile.x[0], tile.x[EDGE - 1]]);
         for line in 0..EDGE {
@@ -227,9 +252,11 @@ impl Leaf {
                     & height.lt(F32x8::load(&tile.depth[line]) * a);
                 if F32x8::any(is_met) {
                     tile.keep(line, height.div(a), is_met, thing, self.number[lane]);
+                    is_any = true;
                 }
             }
         }
+        is_any
     }
 
     /// What the triangles need of rays, and which show their front; none if all show their back.
@@ -289,7 +316,8 @@ impl Drawn {
     #[inline(always)]
     fn bounds(&self, x: [f32; 2]) -> Bounds {
         let factors = |k: usize| {
-            let [a, u, v] = [&self.against, &self.u, &self.v].map(|all| F32x8::load(&all[k]));
+            let a = F32x8::load(&self.against[k]);
+            let (u, v) = (F32x8::load(&self.u[k]), F32x8::load(&self.v[k]));
             [u, v, a - u - v]
         };
         let (along, down, fixed) = (factors(0), factors(1), factors(2));

@@ -14,6 +14,7 @@
 mod build;
 mod cast;
 mod fill;
+mod outer;
 mod parts;
 mod shade;
 
