@@ -165,6 +165,7 @@ TYPES = {
     "[Number; 3]": "3 numbers",
     "[Number; 4]": "4 numbers",
     "[[Number; 3]; 3]": "3 × 3 numbers",
+    "Vec<usize>": "list of whole numbers",
     "Vec<String>": "list of text",
     "Vec<PathBuf>": "list of paths",
     "Vec<[String; 2]>": "list of pairs of text",

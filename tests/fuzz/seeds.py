@@ -285,6 +285,7 @@ width = 16
 height = 8
 fov = 1.2
 every = 2
+worlds = [0]
 depth_noise = [0.01, 0.002]
 
 [randomize.cameras]

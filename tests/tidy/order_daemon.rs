@@ -56,10 +56,7 @@ pub const ORDER: &[(&str, &[&str])] = &[
             "paint", "light", "field", "scene", "shown", "shadow", "shade", "image",
         ],
     ),
-    (
-        "sim-core/render/src/field",
-        &["march", "normals", "open"],
-    ),
+    ("sim-core/render/src/field", &["march", "normals", "open"]),
     (
         "sim-core/render/src/tree",
         &["build", "cast", "fill", "shade", "outer", "parts"],

@@ -44,6 +44,9 @@ pub struct CameraTable {
     /// Control frames from one image to the next; between them, frames repeat the last image.
     #[serde(default = "one")]
     pub every: usize,
+    /// Numbers of the worlds that have images; left out, all worlds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worlds: Option<Vec<usize>>,
     /// What is seen of robots: their `visuals`, or their `collisions`.
     #[serde(default)]
     pub sees: SeesName,
@@ -113,6 +116,7 @@ impl CameraTable {
             near: self.near.0,
             far: self.far.0,
             every: self.every,
+            worlds: self.worlds.clone(),
             sees: match self.sees {
                 SeesName::Visuals => Sees::Visuals,
                 SeesName::Collisions => Sees::Collisions,

@@ -293,6 +293,13 @@ impl SceneFile {
         })
     }
 
+    /// Lets all cameras see every world: who looks at a world sees it, whether the run draws it or not.
+    pub(crate) fn see_every_world(&mut self) {
+        for camera in &mut self.cameras {
+            camera.worlds = None;
+        }
+    }
+
     /// The description this scene stands for, checked; relative paths are looked for in `base_dir`.
     ///
     /// # Errors

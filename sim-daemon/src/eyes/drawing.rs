@@ -39,7 +39,7 @@ impl Eyes {
     /// fault.
     ///
     /// # Errors
-    /// Threads that the system does not start.
+    /// A camera of worlds that are not there, and threads that the system does not start.
     pub(crate) fn of_groups(
         images: &Images,
         threads: usize,
@@ -47,31 +47,45 @@ impl Eyes {
         resets: bool,
     ) -> Result<Vec<Eyes>, DaemonError> {
         let worlds = images.seen.as_ref().map_or(1, |seen| seen.steps.shape[0]);
+        images.check_worlds(worlds * groups)?;
         // one world is drawn by one thread
         let threads = threads.min(worlds.saturating_mul(groups));
-        let workers = images.seen.as_ref().map(|_| {
-            let failed = |reason| BackendError::Threads { threads, reason };
-            Workers::new(threads, groups).map_err(failed)
+        let workers = workers(images, threads, groups)?;
+        let eyes = (0..groups).map(|group| {
+            let (images, workers) = (images.clone(), workers.clone());
+            Eyes::new(images, group * worlds, threads, workers, resets)
         });
-        let workers = workers.transpose()?;
-        let eyes = (0..groups).map(|_| Eyes::new(images.clone(), threads, workers.clone(), resets));
         Ok(eyes.collect())
     }
 
-    /// The cameras of a simulation that shares no threads.
+    /// The cameras of a simulation that shares no threads, whose first world has this number.
     ///
     /// # Errors
-    /// As [`Eyes::of_groups`].
+    /// Threads that the system does not start.
     pub(crate) fn alone(
         images: &Images,
         simulation: &Simulation,
+        first_world: usize,
         resets: bool,
     ) -> Result<Eyes, DaemonError> {
-        let mut eyes = Eyes::of_groups(images, simulation.threads(), 1, resets)?;
-        Ok(eyes.remove(0))
+        let threads = simulation.threads().min(simulation.worlds());
+        let workers = workers(images, threads, 1)?;
+        Ok(Eyes::new(
+            images.clone(),
+            first_world,
+            threads,
+            workers,
+            resets,
+        ))
     }
 
-    fn new(images: Images, threads: usize, workers: Option<Workers>, resets: bool) -> Eyes {
+    fn new(
+        images: Images,
+        first_world: usize,
+        threads: usize,
+        workers: Option<Workers>,
+        resets: bool,
+    ) -> Eyes {
         let mut eyes = Eyes {
             images,
             parts: Vec::new(),
@@ -86,7 +100,7 @@ impl Eyes {
         let count = parts(threads, worlds);
         let parts = (0..count).map(|part| {
             let worlds = part * worlds / count..(part + 1) * worlds / count;
-            Part::new(seen, &eyes.images, worlds)
+            Part::new(seen, &eyes.images, worlds, first_world)
         });
         eyes.parts = parts.collect();
         let depends = |eye: &Eye| eye.chance.is_random() || eye.every > 1;
@@ -132,4 +146,13 @@ impl Eyes {
             part.draw(&seen.sight, fields, &state, images, keeps);
         });
     }
+}
+
+/// The threads that draw images, if there are any.
+fn workers(images: &Images, threads: usize, groups: usize) -> Result<Option<Workers>, DaemonError> {
+    let workers = images.seen.as_ref().map(|_| {
+        let failed = |reason| BackendError::Threads { threads, reason };
+        Workers::new(threads, groups).map_err(failed)
+    });
+    Ok(workers.transpose()?)
 }

@@ -127,6 +127,8 @@ pub struct FrameFields {
     pub images: Vec<String>,
     /// Cameras besides those of the scene.
     pub cameras: Vec<CameraTable>,
+    /// Whether cameras see every world, also those of some worlds.
+    pub of_every_world: bool,
 }
 
 impl FrameFields {

@@ -113,6 +113,29 @@ impl Images {
         Ok(images)
     }
 
+    /// Refuses a camera that is to see worlds beyond these.
+    ///
+    /// # Errors
+    /// [`DaemonError::Argument`] with the field and the world.
+    pub(super) fn check_worlds(&self, worlds: usize) -> Result<(), DaemonError> {
+        let eyes = self.seen.iter().flat_map(|seen| &seen.sight.eyes);
+        for eye in eyes {
+            let Some(last) = eye.last_world().filter(|&last| last >= worlds) else {
+                continue;
+            };
+            let mine = self.fields.iter().find(|field| field.camera == eye.number);
+            return Err(DaemonError::Argument {
+                argument: "fields",
+                value: mine.map_or(String::new(), |field| field.name.clone()),
+                problem: format!(
+                    "its camera sees world {last}, and the last world is {}; give it other worlds, or launch more",
+                    worlds - 1
+                ),
+            });
+        }
+        Ok(())
+    }
+
     /// Their fields.
     pub(crate) fn fields(&self) -> &[ImageField] {
         &self.fields

@@ -13,6 +13,8 @@ use super::sight::{Eye, Sight};
 /// Some worlds, which one thread draws.
 pub(super) struct Part {
     worlds: Range<usize>,
+    /// Number of the first world of the simulation.
+    first_world: usize,
     scratch: Scratch,
     /// Frames of a world's bodies.
     frames: Vec<Frame>,
@@ -36,7 +38,12 @@ struct Repeat {
 }
 
 impl Part {
-    pub(super) fn new(seen: &Seen, images: &Images, worlds: Range<usize>) -> Part {
+    pub(super) fn new(
+        seen: &Seen,
+        images: &Images,
+        worlds: Range<usize>,
+        first_world: usize,
+    ) -> Part {
         let (sight, fields) = (&seen.sight, images.fields());
         let kept = if images.keeps { worlds.len() } else { 0 };
         let repeats = sight.eyes.iter().map(|eye| {
@@ -53,6 +60,7 @@ impl Part {
             shown: vec![None; kept],
             poses: vec![0; kept * seen.poses_bytes()],
             worlds,
+            first_world,
             scratch: Scratch::default(),
             frames: Vec::with_capacity(sight.segments.len()),
             spare: vec![0.0; spare_pixels(sight, fields)],
@@ -77,11 +85,16 @@ impl Part {
         keeps: bool,
     ) {
         for world in self.worlds.clone() {
+            let number = self.first_world + world;
+            if !sight.eyes.iter().any(|eye| eye.sees(number)) {
+                continue;
+            }
             state.frames(world, &mut self.frames);
             let moment = state.moment(world);
             let place_in_part = world - self.worlds.start;
             let is_as_before = self.is_as_before(place_in_part, moment, state.poses(world), keeps);
-            for (place, eye) in sight.eyes.iter().enumerate() {
+            let eyes = sight.eyes.iter().enumerate();
+            for (place, eye) in eyes.filter(|(_, eye)| eye.sees(number)) {
                 let drawn = self.repeats[place].drawn.get_mut(place_in_part);
                 let is_due = match &drawn {
                     Some(drawn) => drawn.is_none_or(|then| !moment.repeats(&then, eye.every)),

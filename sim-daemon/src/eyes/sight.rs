@@ -35,8 +35,23 @@ pub(super) struct Eye {
     pub(super) frame: Frame,
     /// Control frames from one image to the next.
     pub(super) every: u64,
+    /// Numbers of the worlds that have images, in order; all worlds if there are none.
+    worlds: Option<Vec<usize>>,
     pub(super) chance: Chance,
     pub(super) scene: Arc<Scene>,
+}
+
+impl Eye {
+    /// Whether the world of this number has its images.
+    pub(super) fn sees(&self, world: usize) -> bool {
+        let worlds = self.worlds.as_ref();
+        worlds.is_none_or(|worlds| worlds.binary_search(&world).is_ok())
+    }
+
+    /// The last world that has images, if not all have.
+    pub(super) fn last_world(&self) -> Option<usize> {
+        self.worlds.as_ref()?.last().copied()
+    }
 }
 
 impl Sight {
@@ -133,6 +148,10 @@ fn eye(
         body: body.map(|name| place(name).expect("links are bodies of the model")),
         frame: Frame::from(&pose),
         every: camera.every as u64,
+        worlds: camera.worlds.clone().map(|mut worlds| {
+            worlds.sort_unstable();
+            worlds
+        }),
         chance: Chance::new(number, camera),
         scene,
     })

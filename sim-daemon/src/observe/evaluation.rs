@@ -45,6 +45,7 @@ impl Evaluation {
     ) -> Result<Evaluation, DaemonError> {
         let mut scene = config::parse(scene, "scene")?;
         scene.cameras.extend(asked.cameras.iter().cloned());
+        scene.see_every_world();
         let description = scene.describe(folder)?;
         let model = description.compile()?;
         let sight = Sight::open(&scene, folder, &description, &model, &asked.images)?;
@@ -69,7 +70,7 @@ impl Evaluation {
             return Err(ProtocolError::Memory { free, needed, what }.into());
         }
         let simulation = Simulation::new(model, &options)?;
-        let eyes = Eyes::alone(&images, &simulation, drawn.resets)?;
+        let eyes = Eyes::alone(&images, &simulation, drawn.first_world, drawn.resets)?;
         Ok(Evaluation {
             arrays: Arrays::new(&simulation, eyes.images()),
             simulation,

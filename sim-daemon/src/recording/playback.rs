@@ -62,7 +62,11 @@ impl Playback {
             _ => return Err(unreadable(path, "ends before its head; copy it again")),
         };
         let bytes = entries.bytes;
-        let open = |device| Run::open(path, bytes, &head, fields, device, threads);
+        let fields = FrameFields {
+            of_every_world: true,
+            ..fields.clone()
+        };
+        let open = |device| Run::open(path, bytes, &head, &fields, device, threads);
         let (run, note) = match head.daemon.adapter.as_str() {
             "" => (open(Device::Cpu)?, None),
             name => {

@@ -100,10 +100,14 @@ impl Run {
                 "needs the scene's robots and meshes where they were: {error}"
             ))
         })?;
-        let described = match asked.cameras.is_empty() {
+        let is_as_recorded = asked.cameras.is_empty() && !asked.of_every_world;
+        let described = match is_as_recorded {
             true => described,
             false => {
                 scene.cameras.extend(asked.cameras.iter().cloned());
+                if asked.of_every_world {
+                    scene.see_every_world();
+                }
                 scene.describe(Path::new(&daemon.scene_folder))?
             }
         };
@@ -175,7 +179,8 @@ impl Run {
         }
         let simulation =
             Simulation::new(model, &options).map_err(|error| failed(error.to_string()))?;
-        let eyes = Eyes::alone(&images, &simulation, options.faults.resets)?;
+        let (first_world, resets) = (options.first_world, options.faults.resets);
+        let eyes = Eyes::alone(&images, &simulation, first_world, resets)?;
         let info = RunInfo {
             scene: &described,
             scene_text: String::new(),

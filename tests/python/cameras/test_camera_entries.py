@@ -58,6 +58,11 @@ def test_a_camera_with_a_target_has_it_in_the_middle_and_z_up(pos: Any, target: 
         ({"far": 0.001}, "far"),
         ({"every": 0}, "every"),
         ({"every": 10**7}, "every is"),
+        ({"worlds": ()}, "worlds has 0 entries"),
+        ({"worlds": [True, False]}, "np.flatnonzero"),
+        ({"worlds": [2**40]}, "so many worlds"),
+        ({"worlds": (0, -1)}, "worlds is -1"),
+        ({"worlds": 4}, r"such as range\(4\)"),
         ({"near": 1e39, "far": 1e40}, "near is"),
         ({"focal": (1e9, 1.0)}, "focal is"),
         ({"depth_noise": (0.0, 1e6)}, "at most 1000"),
@@ -91,7 +96,9 @@ def test_a_camera_of_a_mujoco_model_that_follows_a_body_is_refused() -> None:
 
 def test_a_scene_file_keeps_its_cameras(tmp_path: Path) -> None:
     scene = scene_with_ball()
-    scene.add_camera(body="ball", pos=(0.3, 0, 0), target=(1, 0, 0), width=16, height=8, fov=1.2, every=2, name="nose")
+    scene.add_camera(
+        body="ball", pos=(0.3, 0, 0), target=(1, 0, 0), width=16, height=8, fov=1.2, every=2, worlds=[3, 1], name="nose"
+    )
     scene.add_camera(
         pos=(0, 0, 2), quat=(1, 0, 0, 0), width=8, height=8, focal=(9, 8), center=(4, 3), sees="collisions"
     )
@@ -99,7 +106,7 @@ def test_a_scene_file_keeps_its_cameras(tmp_path: Path) -> None:
     again = tl.Scene.load(tmp_path / "scene.toml")
     assert again.cameras == scene.cameras
     fields = [name for camera in scene.cameras.values() for name in (camera.depth, camera.segmentation)]
-    with tl.launch(scene, worlds=1, fields=fields) as first, tl.launch(again, worlds=1, fields=fields) as second:
+    with tl.launch(scene, worlds=4, fields=fields) as first, tl.launch(again, worlds=4, fields=fields) as second:
         one, two = first.reset(), second.reset()
         assert all(np.array_equal(getattr(one, name), getattr(two, name)) for name in fields)
         assert one.camera_depth.max() == pytest.approx(2.0, abs=1e-6)

@@ -8,6 +8,7 @@ CAMERA = {
     "near": "positive",
     "far": "positive",
     "every": "count",
+    "worlds": "worlds of a camera",
     "target": "triple",
     "focal": "positive pair",
     "center": "pair",

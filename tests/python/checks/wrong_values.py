@@ -98,6 +98,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
     "index": tuple(value for value in COUNT if value != 0),
     "triple": TRIPLE,
     "positive triple": (*TRIPLE, (0.0, 1, 1), (-1, 1, 1)),
+    "worlds of a camera": ((), (-1,), (1.5,), ("a",), "ab", 3, (2**70,), [[1]], [True], THING, NAN),
     "pair": ((1, NAN), (1, INF), (1, 2, 3), (1,), "ab", 3, THING),
     "noise": ((0.0, -1.0), (1, NAN), (1, INF), (1, 2, 3), (1,), "ab", 3, THING, (0.0, 1e9)),
     "positive pair": ((0.0, 1), (1, -1), (1, NAN), (1, INF), (1, 2, 3), (1,), "ab", 3, THING),

@@ -26,6 +26,8 @@ pub struct Camera {
     pub far: f64,
     /// Control frames from one image to the next.
     pub every: usize,
+    /// Numbers of the worlds that have images; all of them if there are none.
+    pub worlds: Option<Vec<usize>>,
     /// What it sees of robots.
     pub sees: Sees,
     /// Standard deviation of a depth: so much [m], and so much times the square of the depth [1/m].

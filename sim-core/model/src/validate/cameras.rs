@@ -13,6 +13,8 @@ const NAME_MAX: usize = 19;
 const PIXELS_MAX: usize = 4096;
 /// Most frames from one image to the next.
 const EVERY_MAX: usize = 1_000_000;
+/// No launch has as many worlds.
+const WORLDS_MAX: f64 = (1u64 << 31) as f64;
 
 impl Description {
     pub(super) fn validate_cameras(&self) -> Result<(), ModelError> {
@@ -62,6 +64,14 @@ impl Description {
         in_range(&format!("{what}: far"), camera.far, holds, rule)?;
         let rule = "it must be between 1 and 1000000 frames";
         count(&format!("{what}: every"), camera.every, EVERY_MAX, rule)?;
+        if let Some(worlds) = &camera.worlds {
+            let rule = "give 1 to 1000000, or leave them out for all";
+            let named = format!("{what}: number of worlds");
+            count(&named, worlds.len(), EVERY_MAX, rule)?;
+            let last = worlds.iter().copied().max().unwrap_or(0) as f64;
+            let rule = "it must be below 2^31";
+            in_range(&format!("{what}: world"), last, last < WORLDS_MAX, rule)?;
+        }
         for value in camera.depth_noise {
             let rule = "it must be between 0 and 1000";
             let holds = (0.0..=1000.0).contains(&value);
@@ -114,6 +124,7 @@ mod tests {
             near: Camera::NEAR,
             far: Camera::FAR,
             every: 1,
+            worlds: None,
             sees: Sees::Visuals,
             depth_noise: [0.0; 2],
             draws: [None; 7],
@@ -132,7 +143,7 @@ mod tests {
     fn what_is_wrong_with_a_camera_is_named() {
         assert_eq!(problem(vec![camera()]), "");
         type Change = (&'static str, fn(&mut Camera));
-        let wrong: [Change; 14] = [
+        let wrong: [Change; 16] = [
             ("`a b`", |camera| camera.name = "a b".to_owned()),
             ("`3d`", |camera| camera.name = "3d".to_owned()),
             ("at most 19 bytes", |camera| camera.name = "c".repeat(20)),
@@ -157,6 +168,12 @@ mod tests {
             ("far", |camera| camera.far = 1e40),
             ("every", |camera| camera.every = 0),
             ("depth_noise", |camera| camera.depth_noise = [0.0, -1.0]),
+            ("number of worlds", |camera| {
+                camera.worlds = Some(Vec::new())
+            }),
+            ("world is", |camera| {
+                camera.worlds = Some(vec![0, usize::MAX])
+            }),
         ];
         for (culprit, make_wrong) in wrong {
             let mut camera = camera();

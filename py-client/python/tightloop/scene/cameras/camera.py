@@ -32,6 +32,7 @@ class Camera:
         near: Nearest depth that is seen [m].
         far: Farthest depth that is seen [m].
         every: Control frames from one image to the next.
+        worlds: Numbers of the worlds that have images; None for all.
         sees: What is seen of robots: ``"visuals"`` or ``"collisions"``.
         depth_noise: Standard deviation of a depth: so much [m], and so much times its square [1/m].
     """
@@ -49,6 +50,7 @@ class Camera:
     every: int
     sees: Sees
     depth_noise: tuple[float, float] = (0.0, 0.0)
+    worlds: tuple[int, ...] | None = None
 
     @property
     def depth(self) -> str:

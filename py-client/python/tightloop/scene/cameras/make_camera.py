@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import get_args
+
+import numpy as np
 
 from tightloop.checks import arguments as checks
 from tightloop.checks.arguments import Vector
@@ -22,7 +25,7 @@ FOV = math.pi / 4
 PIXELS_MAX = 4096
 _NEAR_MIN, _FAR_MAX = 1e-6, 1e6  # [m]
 _FOCAL_MIN, _FOCAL_MAX = 1e-2, 1e7  # [pixels]
-_EVERY_MAX, _NOISE_MAX = 1_000_000, 1000.0
+_EVERY_MAX, _WORLDS_MAX, _NOISE_MAX = 1_000_000, 1_000_000, 1000.0
 #: Longest name [bytes].
 NAME_MAX = 19
 
@@ -44,6 +47,7 @@ def add_camera(
     near: float,
     far: float,
     every: int,
+    worlds: Sequence[int] | None,
     sees: Sees,
     depth_noise: Vector,
 ) -> Camera:
@@ -100,6 +104,7 @@ def add_camera(
         near=nearest,
         far=_within(f"{what}: far", checks.number(f"{what}: far", far, above=nearest)),
         every=_frames(f"{what}: every", every),
+        worlds=None if worlds is None else _worlds(f"{what}: worlds", worlds),
         sees=sees,
         depth_noise=noise,
     )
@@ -110,6 +115,20 @@ def _within(what: str, depth: float) -> float:
     if not _NEAR_MIN <= depth <= _FAR_MAX:
         raise SceneError(f"{what} is {depth!r}; give {_NEAR_MIN:g} to {_FAR_MAX:g} m")
     return depth
+
+
+def _worlds(what: str, worlds: Sequence[int]) -> tuple[int, ...]:
+    if isinstance(worlds, str | bytes) or not isinstance(worlds, Sequence | np.ndarray):
+        raise SceneError(f"{what} is {worlds!r:.80}; give numbers of worlds, such as range(4)")
+    if not 0 < len(worlds) <= _WORLDS_MAX:
+        expected = f"give 1 to {_WORLDS_MAX} numbers of worlds, such as range(4), or leave it out for all"
+        raise SceneError(f"{what} has {len(worlds)} entries; {expected}")
+    numbers = {checks.integer(what, number, least=0) for number in worlds}
+    if any(isinstance(number, bool | np.bool_) for number in worlds):
+        raise SceneError(f"{what} is a mask; give numbers of worlds, as np.flatnonzero makes them of a mask")
+    if max(numbers) >= 1 << 31:
+        raise SceneError(f"{what} is {max(numbers)}; no launch has so many worlds")
+    return tuple(sorted(numbers))
 
 
 def _frames(what: str, every: int) -> int:

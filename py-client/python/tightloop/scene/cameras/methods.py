@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from tightloop.checks.arguments import Vector
@@ -38,6 +39,7 @@ class CameraMethods(Attributes):
         near: float = 0.01,
         far: float = 10.0,
         every: int = 1,
+        worlds: Sequence[int] | None = None,
         sees: Sees = "visuals",
         depth_noise: Vector = (0.0, 0.0),
         mujoco: str | None = None,
@@ -70,6 +72,8 @@ class CameraMethods(Attributes):
             far: Farthest depth that is seen [m], at most 1e6.
             every: Control frames from one image to the next. An image is drawn at each multiple of it in a world's
                 ``step``, and frames repeat it in between.
+            worlds: Numbers of the worlds that have images, such as ``range(4)``; all if left out. Images of the others
+                are 0, labels too, and take no time. Numbers go on through groups. A launch needs these worlds.
             sees: What is seen of robots whose files have both: ``"visuals"`` or ``"collisions"``. Robots without any
                 visuals are seen by their collision shapes.
             depth_noise: Standard deviation of depths, ``(a, b)``: a + b z² of a depth z [m, 1/m]. Each pixel of each
@@ -101,6 +105,7 @@ class CameraMethods(Attributes):
             near=near,
             far=far,
             every=every,
+            worlds=worlds,
             sees=sees,
             depth_noise=depth_noise,
         )
