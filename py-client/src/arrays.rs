@@ -176,9 +176,10 @@ fn place<T: Element + Copy, O: Number>(
 }
 
 /// Commands from actions: column k of `out`, from `first` on, becomes `base + scale * action`, within `low` and `high`, one a
-/// column of `action`. The base is `start`, one per column, or without it what stands there. NaN stays NaN.
+/// column of `action`. The base is `start`, one per column, or without it what stands there. NaN stays NaN. With `joint_q`, of
+/// the shape of `action`, it is at most `lead` from there, too.
 #[pyfunction]
-#[pyo3(signature = (out, first, action, scale, start, low, high, /))]
+#[pyo3(signature = (out, first, action, scale, start, low, high, joint_q, lead, /))]
 #[allow(clippy::too_many_arguments)] // a call of Python's, with positions only
 pub(crate) fn drive(
     py: Python<'_>,
@@ -189,12 +190,17 @@ pub(crate) fn drive(
     start: Option<PyReadonlyArray1<'_, f32>>,
     low: PyReadonlyArray1<'_, f32>,
     high: PyReadonlyArray1<'_, f32>,
+    joint_q: Option<PyReadonlyArray2<'_, f32>>,
+    lead: f32,
 ) -> PyResult<()> {
     let (scale, low, high) = (scale.as_slice()?, low.as_slice()?, high.as_slice()?);
     let start = start.as_ref().map(|start| start.as_slice()).transpose()?;
     let (mut out, action) = (out.as_array_mut(), action.as_array());
     let size = action.ncols();
-    let fits = first + size <= out.ncols() && action.nrows() == out.nrows();
+    let joint_q = joint_q.as_ref().map(|joint_q| joint_q.as_array());
+    let fits = first + size <= out.ncols()
+        && action.nrows() == out.nrows()
+        && joint_q.is_none_or(|joint_q| joint_q.dim() == action.dim());
     let one_each = [
         scale.len(),
         low.len(),
@@ -202,14 +208,29 @@ pub(crate) fn drive(
         start.map_or(size, <[f32]>::len),
     ];
     let ordered = low.iter().zip(high).all(|(low, high)| low <= high);
-    if !fits || one_each != [size; 4] || !ordered {
+    if !fits || one_each != [size; 4] || !ordered || lead.is_nan() || lead < 0.0 {
         let problem = format!("drive: shapes or bounds do not fit {size} columns from {first} on");
         return Err(raise(py, "ArgumentError", problem));
     }
-    for (mut to, from) in out.rows_mut().into_iter().zip(action.rows()) {
+    for (row, (mut to, from)) in out.rows_mut().into_iter().zip(action.rows()).enumerate() {
         for (k, number) in from.iter().enumerate() {
             let base = start.map_or(to[first + k], |start| start[k]);
-            to[first + k] = (base + scale[k] * number).clamp(low[k], high[k]);
+            let mut target = base + scale[k] * number;
+            if let Some(joint_q) = joint_q {
+                // of a NaN they keep the target
+                let place = joint_q[[row, k]];
+                target = if target < place - lead {
+                    place - lead
+                } else {
+                    target
+                };
+                target = if target > place + lead {
+                    place + lead
+                } else {
+                    target
+                };
+            }
+            to[first + k] = target.clamp(low[k], high[k]);
         }
     }
     Ok(())

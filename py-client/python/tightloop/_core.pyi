@@ -459,6 +459,8 @@ def drive(
     start: NDArray[np.float32] | None,
     low: NDArray[np.float32],
     high: NDArray[np.float32],
+    joint_q: NDArray[np.float32] | None,
+    lead: float,
     /,
 ) -> None: ...
 @overload

@@ -49,7 +49,9 @@ ENV_CALLS: dict[str, Call] = {
         {"dofs": ["arm/fr3_joint1"], "scale": 1.0},
     ),
     "JointDelta": Call(
-        lambda _: env.JointDelta, {"dofs": "dofs", "scale": "per dof"}, {"dofs": ["arm/fr3_joint1"], "scale": 1.0}
+        lambda _: env.JointDelta,
+        {"dofs": "dofs", "scale": "per dof", "lead": "positive"},
+        {"dofs": ["arm/fr3_joint1"], "scale": 1.0},
     ),
     "Gripper": Call(
         lambda _: env.Gripper,

@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 
 from tightloop.env import VectorEnv
+from tightloop.tasks.pick_cube import FrankaPickCube
 from tightloop.tasks.pick_cube_depth import FrankaPickCubeDepth
 
 WORLDS = 64
 
 
 class Labelled(FrankaPickCubeDepth):
-    """The task, of whose images the labels are known."""
+    """The task with the targets of the other one, and of whose images the labels are known."""
 
     fields = (*FrankaPickCubeDepth.fields, "wrist_segmentation")
+    lead = FrankaPickCube.lead
 
 
 def test_it_is_pick_cube_with_an_image_in_place_of_the_pose_of_the_cube() -> None:

@@ -112,14 +112,23 @@ class _Joints:
         """What an action of 0 means, shape ``(size,)``; 0 for changes of a target."""
         return self._start if self._is_absolute else np.zeros(self.size, np.float32)
 
-    def _drive(self, action: NDArray[np.float32], start: NDArray[np.float32] | None) -> None:
-        """Write ``start + scale * action`` or, without a start, add ``scale * action`` to it, within limits."""
+    def _drive(
+        self,
+        action: NDArray[np.float32],
+        start: NDArray[np.float32] | None,
+        joint_q: NDArray[np.float32] | None = None,
+        lead: float = np.inf,
+    ) -> None:
+        """Write ``start + scale * action`` or, without a start, add ``scale * action`` to it, within limits.
+
+        With ``joint_q``, of the shape of the action, it is at most ``lead`` from there, too.
+        """
         if self._side_by_side:
-            _core.drive(self._array, self._first, action, self._scale, start, self._low, self._high)
+            _core.drive(self._array, self._first, action, self._scale, start, self._low, self._high, joint_q, lead)
             return
         if start is None:
             self._own[:] = self._array[:, self._columns]
-        _core.drive(self._own, 0, action, self._scale, start, self._low, self._high)
+        _core.drive(self._own, 0, action, self._scale, start, self._low, self._high, joint_q, lead)
         self._array[:, self._columns] = self._own
 
 
@@ -182,14 +191,47 @@ class JointTarget(_Joints):
 class JointDelta(_Joints):
     """Increments of the drive targets, ``target + scale * action`` [rad or m], clipped to the joint limits.
 
-    An increment starts from the last target, not from the joint position, so that a load causes no drift.
+    An increment starts from the last target, not from the joint position, so that a load causes no drift. A ``lead``
+    keeps targets near their joints.
     """
 
     _is_absolute = False
 
+    @checked_calls
+    def __init__(self, dofs: Sequence[str], scale: ArrayLike, *, lead: float | None = None) -> None:
+        """Make a control of targets that move.
+
+        Args:
+            dofs: Names of the dofs, ``robot/joint``; with ``lead``, of joints with one coordinate.
+            scale: Increment of an action of 1 [rad or m], for all dofs or for each.
+            lead: How far a target may be from where its joint is [rad or m]; any distance if left out. A joint that is
+                stopped then comes back at once. Under a load that pulls it further from its target, it sinks.
+        """
+        super().__init__(dofs, scale)
+        self._lead = None if lead is None else checks.number("JointDelta: lead", lead, above=0.0, error=ArgumentError)
+        self.fields: tuple[str, ...] = () if lead is None else ("joint_q",)
+
+    @property
+    def lead(self) -> float:
+        """How far a target may be from its joint [rad or m]; infinite without a bound."""
+        return np.inf if self._lead is None else self._lead
+
+    def bind(self, names: Names, commands: Commands) -> None:
+        """Look up the dofs."""
+        super().bind(names, commands)
+        if self._lead is None:
+            return
+        places = [names.coord(name) for name in self._dofs]
+        is_row = places == list(range(places[0], places[0] + self._count))
+        self._coords = slice(places[0], places[0] + self._count) if is_row else np.array(places)
+
     def apply(self, action: NDArray[np.float32], frame: Any) -> None:
         """Increment the targets."""
-        self._drive(action, None)
+        if self._lead is None:
+            self._drive(action, None)
+            return
+        joint_q = np.asarray(frame.joint_q[:, self._coords], np.float32)
+        self._drive(action, None, joint_q, self._lead)
 
 
 class ActuatorControl:

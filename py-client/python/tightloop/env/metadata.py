@@ -75,6 +75,7 @@ def policy_metadata(envs: VectorEnv) -> dict[str, str]:
         "action_types": [type(control).__name__ for control in controls for _ in range(control.size)],
         "action_scale": _joined(controls, "scales"),
         "action_offset": _joined(controls, "offsets"),
+        "action_lead": [getattr(control, "lead", np.inf) for control in controls for _ in range(control.size)],
         "action_low": space.low,
         "action_high": space.high,
     }

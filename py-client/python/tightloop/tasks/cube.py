@@ -48,12 +48,14 @@ class CubeTask(Task):
     noise: ClassVar[tl.Normal | None] = None  # of the arm's joints at the start [rad]
     spread: ClassVar[Mapping[str, tl.Uniform]]  # of the cube about its place, as `Scene.randomize` has it
     binary_gripper: ClassVar[bool] = False
+    #: How far a target of ``joint_delta`` may be from its joint [rad]; any distance if None.
+    lead: ClassVar[float | None] = None
 
     def __init__(self, control: str) -> None:
         self._control = control
         scale = 0.5 if control == "joint_target" else 0.1
         gripper = franka.gripper(binary=self.binary_gripper)
-        self._arm_controls = franka.controls(control, scale=scale, limit=LIMIT, gripper=gripper)
+        self._arm_controls = franka.controls(control, scale=scale, limit=LIMIT, gripper=gripper, lead=self.lead)
 
     def scene(self) -> tl.Scene:
         """Arm and cube on the ground, and contact sensors of the fingers."""

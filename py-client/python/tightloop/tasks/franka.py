@@ -52,7 +52,9 @@ def add_arm(
     return arm
 
 
-def controls(name: str, *, scale: float, gripper: Gripper | None = None, limit: float = 1.0) -> list[Control]:
+def controls(
+    name: str, *, scale: float, gripper: Gripper | None = None, limit: float = 1.0, lead: float | None = None
+) -> list[Control]:
     """What an action does to the arm: seven numbers (``end_effector_delta``: six), and one for the gripper if given.
 
     Args:
@@ -60,13 +62,14 @@ def controls(name: str, *, scale: float, gripper: Gripper | None = None, limit: 
         scale: Of ``joint_target``: how far from the start [rad]; of ``joint_delta``: how far a step [rad].
         gripper: The control of the fingers.
         limit: How large an action of ``joint_target`` may be; of the others 1.
+        lead: How far a target of ``joint_delta`` may be from its joint [rad]; any distance if left out.
 
     Raises:
         ArgumentError: There is no such control.
     """
     arms = {
         "joint_target": lambda: JointTarget(ARM, scale, limit=limit),
-        "joint_delta": lambda: JointDelta(ARM, scale),
+        "joint_delta": lambda: JointDelta(ARM, scale, lead=lead),
         "end_effector_delta": lambda: EndEffectorDelta(TCP, ARM, pos_scale=0.05, rot_scale=0.1),
         "torque": lambda: JointTorque(ARM, _TORQUE, hold=True),
     }

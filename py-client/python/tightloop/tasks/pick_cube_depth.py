@@ -1,6 +1,7 @@
 """A Franka arm grasps a cube that only a depth camera at its hand sees, and takes it to a place in the air.
 
-Scene, actions, rewards and success are those of `tightloop.tasks.pick_cube`. The observation has what ManiSkill 3
+Scene, rewards and success are those of `tightloop.tasks.pick_cube`. So are actions, but targets stay within 0.1 rad of
+the joints, as in ManiSkill: an arm that leans on the ground comes up at once. The observation has what ManiSkill 3
 leaves to ``PickCube-v1`` in its visual modes, and an image of 64 by 64 pixels instead of the cube's pose. The camera is
 7 cm before the hand's axis and looks past the fingers; it sees 80°, and of the arm its collision shapes.
 
@@ -42,6 +43,7 @@ class FrankaPickCubeDepth(FrankaPickCube):
     """Pick a cube by a depth camera. ``control`` is one of `tightloop.tasks.franka.CONTROLS`."""
 
     fields = (*FrankaPickCube.fields, "wrist_depth")
+    lead = 0.1
 
     def scene(self) -> tl.Scene:
         """That of `FrankaPickCube`, and a camera at the hand."""
