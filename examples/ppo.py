@@ -201,6 +201,8 @@ class Trainer:
         config, agent = self.config, self.agent
         sizes, rows = self._look_back(r)
         std_old, entropy = torch.exp(agent.log_std.detach()), config.entropy * (1.0 - config.anneal * progress)
+        # mean actions stay near 0 where they have no effect, so that they can turn soon
+        calm = config.calm * (1.0 - progress)
         moved, losses = [], []
         for _ in range(config.epochs):
             order = torch.randperm(len(rows), generator=self.shuffle, device=self.device)
@@ -213,6 +215,8 @@ class Trainer:
                 clipped = value_old + (value - value_old).clamp(-config.clip, config.clip)
                 off = torch.max((value - target) ** 2, (clipped - target) ** 2).mean()
                 loss = off - (weight * better).mean() - entropy * agent.log_std.sum()
+                if calm > 0.0:
+                    loss = loss + calm * mean.square().sum(1).mean()
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(agent.policy_parameters(), config.grad_max)

@@ -43,7 +43,7 @@ RUNS = OUT / "ddp"
 class Loss(nn.Module):
     """The loss of a minibatch, as a module: `DistributedDataParallel` averages gradients of a module's forward.
 
-    The weight of the entropy stays the same, also with ``anneal`` in the preset.
+    The weights of the entropy and of ``calm`` stay the same, also with ``anneal`` in the preset.
     """
 
     def __init__(self, agent: Agent, config: Config) -> None:
@@ -60,7 +60,8 @@ class Loss(nn.Module):
         value = ((agent.value(obs) - target) ** 2).mean()
         # the standard deviation moves little within a rollout
         change = (((mean - mean_old) / std) ** 2).sum(-1).mean().detach() / 2.0
-        return value - better.mean() - self.config.entropy * agent.log_std.sum(), change
+        loss = value - better.mean() - self.config.entropy * agent.log_std.sum()
+        return loss + self.config.calm * mean.square().sum(1).mean(), change
 
 
 def of_all_ranks(values: Tensor) -> Tensor:

@@ -20,6 +20,7 @@ class Config:
     lam: float = 0.95  # λ of the advantages
     clip: float = 0.2  # of the ratio of probabilities
     entropy: float = 0.0  # weight of the entropy in the loss
+    calm: float = 0.0  # weight of the squares of all mean actions in the loss; it falls to 0 by the end of the run
     anneal: bool = False  # whether the weight of the entropy falls to 0 by the end of the run
     lr: float = 1e-3  # learning rate at the start
     kl: float = 0.01  # change of the policy that the learning rate aims at, a rollout; a tenth of it at the end
@@ -50,7 +51,7 @@ PRESETS = {
         60.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=60.0
     ),
     "FrankaPickCubeDepth": Config(
-        30.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, kl=0.02, evaluate=120.0
+        10.0, 1024, 20, epochs=8, minibatches=32, gamma=0.8, lam=0.9, hidden=256, calm=0.02, kl=0.02, evaluate=60.0
     ),
     "QuadrupedVelocityFlat": Config(
         5.0, 512, 16, epochs=2, gamma=0.98, entropy=0.004, kl=0.03, std=0.7, mirror=True, evaluate=30.0
