@@ -15,7 +15,7 @@ use crate::vector::Frame;
 /// Memory that images need meanwhile: one for each thread.
 #[derive(Default)]
 pub struct Scratch {
-    /// Of all things, in the frame of the camera; of those that rest, of which something is placed.
+    /// Of all things, in the frame of the camera; of those that rest, of which something is seen.
     frames: Vec<Frame>,
     /// Those that rest, once a tile asked for them.
     resting: Vec<Resting>,
@@ -41,9 +41,9 @@ struct Resting {
 /// Where an image goes, row by row. `(height, width)` each, if not said otherwise
 #[derive(Debug)]
 pub struct Image<'a> {
-    /// Depth along the camera's z [m]; 0 where nothing is placed.
+    /// Depth along the camera's z [m]; 0 where nothing is seen.
     pub depth: &'a mut [f32],
-    /// Labels of parts, [`crate::NOTHING`] where none is placed.
+    /// Labels of parts, [`crate::NOTHING`] where none is seen.
     pub labels: Option<&'a mut [i32]>,
     /// Red, green and blue, as a screen shows them. `(height, width, 3)`
     pub rgb: Option<&'a mut [u8]>,

@@ -75,7 +75,7 @@ def test_numbers_of_worlds_go_on_through_groups(tmp_path: Path) -> None:
 def test_a_world_that_is_not_there_is_named() -> None:
     with pytest.raises(tl.ArgumentError, match=r"eye_rgb.*sees world 6, and the last world is 5; give it other"):
         tl.launch(scene_seen_in((2, 6)), worlds=WORLDS, fields=("joint_q", "eye_rgb"))
-    # nobody asks for its images
+    # without a field of its images
     with tl.launch(scene_seen_in((2, 6)), worlds=WORLDS, fields=("joint_q",)) as sim:
         sim.reset()
 
