@@ -4,7 +4,7 @@ use sim_physics::lane::{Fixed, Table};
 use std::panic::Location;
 
 /// The deepest nesting of loops: each body is recorded twice, so recording takes time in 2^depth.
-pub const MAX_NESTING: usize = 4;
+pub const MAX_NESTING: usize = 5;
 
 /// Location in the physics code.
 pub(super) type Place = &'static Location<'static>;

@@ -288,7 +288,9 @@ fn kernel(plan: &Plan<'_>, p: usize, options: &ProgramOptions) -> Kernel {
         ..recording
     };
     let values = &plan.recording.values;
-    if plan.recording.lanes > 1 && piece.items.iter().any(|item| item.needs_lanes(values)) {
+    let shares = piece.items.iter().any(|item| item.needs_lanes(values));
+    // what a lane has may be computed again here
+    if plan.recording.lanes > 1 && (shares || recording.values.contains(&Op::Lane)) {
         recording.lanes = plan.recording.lanes;
         lanes::share(&mut recording);
     }

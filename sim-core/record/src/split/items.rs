@@ -2,7 +2,7 @@
 
 use super::cost::{self, Cost};
 use super::order::Part;
-use crate::ir::tree::{Op, Operand, Row, Statement, Unary};
+use crate::ir::tree::{Binary, Op, Operand, Row, Statement, Unary};
 use crate::ir::uses::{Use, of_op, of_statement};
 use crate::passes::lanes;
 use crate::passes::vectorize;
@@ -67,7 +67,22 @@ pub(super) fn cost_of(statement: &Statement, values: &[Op]) -> Cost {
     }
 }
 
-/// Whether it is cheaper to compute a value again than to keep it.
+/// Whether a value is the number of a lane, a comparison with it, or a choice by that: which of some values the lane has.
+fn is_of_lane(op: &Op, values: &[Op]) -> bool {
+    let is_mask = |op: &Op| match *op {
+        Op::Binary(Binary::Lt, bound, Operand::Value(lane)) => {
+            bound.constant().is_some() && values[lane as usize] == Op::Lane
+        }
+        _ => false,
+    };
+    match *op {
+        Op::Lane => true,
+        Op::Select(Operand::Value(mask), ..) => is_mask(&values[mask as usize]),
+        _ => is_mask(op),
+    }
+}
+
+/// Whether it is cheaper to compute a value again than to keep it. What differs between the lanes of a world cannot be kept.
 pub(super) fn is_computed_again(op: &Op, values: &[Op]) -> bool {
     let is_given = |x: Operand| match x {
         Operand::Value(number) => matches!(values[number as usize], Op::Input(_)),
@@ -76,7 +91,7 @@ pub(super) fn is_computed_again(op: &Op, values: &[Op]) -> bool {
     match op {
         Op::Input(_) | Op::Unary(Unary::Neg | Unary::Not, _) => true,
         Op::Unary(_, x) => is_given(*x),
-        Op::Binary(_, a, b) => {
+        Op::Binary(_, a, b) if !is_of_lane(op, values) => {
             let inputs = [a, b]
                 .iter()
                 .filter(|x| matches!(x, Operand::Value(_)))
@@ -84,7 +99,7 @@ pub(super) fn is_computed_again(op: &Op, values: &[Op]) -> bool {
             is_given(*a) && is_given(*b) && inputs == 1
         }
         Op::Constant(entry) | Op::Index { entry, .. } => matches!(entry.row, Row::At(_)),
-        _ => false,
+        _ => is_of_lane(op, values),
     }
 }
 

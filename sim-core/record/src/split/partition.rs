@@ -1,16 +1,20 @@
 //! Partitions a recording into pieces, each of which becomes a kernel.
 
-use super::items::{Item, Piece, Pieces, REGION_FIELDS, Region, cost_of};
+use super::items::{Item, Piece, Pieces, REGION_FIELDS, Region, bases, cost_of};
 use super::live_ranges::LiveRanges;
 use super::order::{Limits, Part};
 use crate::ir::recording::Recording;
-use crate::ir::tree::{Bounds, Row, Statement};
+use crate::ir::tree::{Bounds, Op, Row, Statement};
+use crate::ir::uses::{Use, computed, of_statement};
+use crate::passes::lanes;
+use std::collections::HashSet;
 
 pub(super) fn pieces(recording: &Recording, limits: Limits, spare: u32) -> Pieces {
     let mut cutter = Cutter {
         recording,
         limits,
         spare,
+        of_lanes: OfLanes::new(recording),
         regions: Vec::new(),
         runs: Vec::new(),
     };
@@ -72,6 +76,7 @@ struct Cutter<'a> {
     recording: &'a Recording,
     limits: Limits,
     spare: u32,
+    of_lanes: OfLanes,
     regions: Vec<Region>,
     /// Statements between cuts that have to be.
     runs: Vec<Piece>,
@@ -150,12 +155,48 @@ impl Cutter<'_> {
         self.runs.push(std::mem::replace(run, next));
     }
 
-    /// Is a loop or a block cut inside?
+    /// Is a loop or a block cut inside? What differs between the lanes of a world cannot cross from kernel to kernel.
     fn is_cut(&self, statement: &Statement, iterations: usize) -> bool {
+        let values = &self.recording.values;
         let most = match iterations {
             1 => self.limits.kernel,
             _ => self.limits.repeated,
         };
-        cost_of(statement, &self.recording.values).total(&self.limits.prices) > most
+        cost_of(statement, values).total(&self.limits.prices) > most
+            && !self.of_lanes.are_given(statement, values)
+    }
+}
+
+/// Values and variables that differ between the lanes of a world.
+struct OfLanes {
+    values: Vec<bool>,
+    names: HashSet<u32>,
+}
+
+impl OfLanes {
+    fn new(recording: &Recording) -> OfLanes {
+        let (values, names) = lanes::varying(recording);
+        OfLanes { values, names }
+    }
+
+    /// Does a statement use any that it has not made itself?
+    fn are_given(&self, statement: &Statement, values: &[Op]) -> bool {
+        let (mut made, mut started, mut given) = (HashSet::new(), HashSet::new(), false);
+        computed(std::slice::from_ref(statement), &mut |x| {
+            made.insert(x);
+        });
+        of_statement(statement, values, &mut |used| match used {
+            Use::Value(number) => bases(number, values, &mut |base| {
+                given |= self.values[base as usize] && !made.contains(&base);
+            }),
+            Use::Start(name) => {
+                started.insert(name);
+            }
+            Use::Read(name) | Use::Change(name) => {
+                given |= self.names.contains(&name) && !started.contains(&name);
+            }
+            Use::Index(_) => {}
+        });
+        given
     }
 }

@@ -291,5 +291,64 @@ fn what_differs_between_lanes_stays_inside_a_kernel() {
         let kernels = parts.kernels.iter();
         kernels.filter(|k| k.recording().lanes() > 1).count()
     };
-    assert_eq!((wide(&whole), wide(&cut)), (1, 1));
+    // the loop with what reads its sums; then what needs no more than the lanes' numbers, which are chosen again
+    assert_eq!((wide(&whole), wide(&cut)), (1, 2));
+}
+
+/// Statements that need one another.
+fn chain(mut y: Recorded, x: Recorded) -> Recorded {
+    for k in 0..60 {
+        y = y.fma(x, c(0.01 * k as f64));
+    }
+    y
+}
+
+#[test]
+fn what_a_lane_chose_is_chosen_again_behind_a_cut() {
+    for lanes in LANES {
+        let recording = recorded(lanes, |cx, _, x| {
+            let values: Vec<Recorded> = (0..lanes).map(|k| x[k % 2] * c(k as f64 + 1.0)).collect();
+            let own = cx.own(&values);
+            let before = cx.sum_lanes(own);
+            let between = chain(before, x[1]);
+            let after = cx.max_lanes(own * between);
+            vec![before, between, after]
+        });
+        let whole = kernels(&recording, 100_000);
+        let cut = kernels(&recording, 60);
+        assert!(cut.kernels.len() > 1, "{lanes} lanes");
+        let given = [0.3, 0.9];
+        let expected = evaluated(&whole, given, &mut memory(0));
+        assert_eq!(evaluated(&cut, given, &mut memory(0)), expected);
+    }
+}
+
+#[test]
+fn a_block_that_uses_what_lanes_computed_is_not_cut_inside() {
+    let code = |cx: &mut Recorder, _: &List, x: &[Recorded]| {
+        let own = cx.own(&[x[0], x[1]]);
+        // another number in each lane, which cannot be chosen again
+        let mut squares = own * own;
+        for _ in 0..20 {
+            squares = squares.fma(own, own);
+        }
+        let mut sum = cx.var(x[0]);
+        when!(cx, x[0].lt(x[1]), {
+            let first = cx.sum_lanes(squares);
+            let second = chain(first, x[1]);
+            let third = cx.max_lanes(squares * second);
+            cx.set(&mut sum, chain(third, x[0]));
+        });
+        vec![cx.get(&sum)]
+    };
+    let recording = recorded(4, code);
+    let whole = kernels(&recording, 100_000);
+    for given in [[0.3, 0.9], [0.9, 0.3]] {
+        let expected = evaluated(&whole, given, &mut memory(0));
+        // where the block alone is too large, and where nothing fits
+        for most in [100, 20] {
+            let cut = kernels(&recording, most);
+            assert_eq!(evaluated(&cut, given, &mut memory(0)), expected, "{most}");
+        }
+    }
 }
