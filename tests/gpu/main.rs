@@ -13,6 +13,7 @@ mod lanes;
 #[path = "../../sim-core/device/tests/device/layer.rs"]
 mod layer;
 mod lost;
+mod models;
 mod programs;
 mod same_bits;
 mod sharing;

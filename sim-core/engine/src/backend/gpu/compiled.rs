@@ -164,7 +164,7 @@ impl Compiled {
 }
 
 /// How often a kernel is dispatched.
-fn dispatches_of(kernel: usize, order: &[Part]) -> usize {
+pub(super) fn dispatches_of(kernel: usize, order: &[Part]) -> usize {
     let dispatches = order.iter().map(|part| match part {
         Part::Kernel(k) => usize::from(*k == kernel),
         Part::Repeat {

@@ -71,6 +71,14 @@ fn limits(info: &AdapterInfo, threads: usize, cuts: Cuts) -> Limits {
     cuts.replace(usual)
 }
 
+/// The constants of a model, as kernels with so many threads per world have them.
+pub(super) fn constants(model: &Model, threads: usize) -> Constants<f32> {
+    match threads {
+        1 => model.constants().cast(),
+        _ => with_blocks(merged(model.constants())).cast(),
+    }
+}
+
 /// What a caller asks of a GPU, besides a model and its worlds.
 pub struct Wanted<'a> {
     /// The adapter.
@@ -136,11 +144,9 @@ impl Gpu {
         let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let asked_threads = asked.world_threads;
-        let threads = asked_threads.unwrap_or_else(|| workgroups::of_world(device.info()));
-        let constants: Constants<f32> = match threads {
-            1 => model.constants().cast(),
-            _ => with_blocks(merged(model.constants())).cast(),
-        };
+        let threads =
+            asked_threads.unwrap_or_else(|| workgroups::of_world(device.info(), model.constants()));
+        let constants = constants(model, threads);
         let m = &constants;
         let computed = show::computed(layout);
         let mut places = Places::new(m, &computed);
@@ -154,10 +160,7 @@ impl Gpu {
             exchange: workgroups::exchange(info),
         };
         let substeps = model.substeps();
-        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, how)
-            .map_err(|e| BackendError::Program {
-                reason: e.to_string(),
-            })?;
+        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, how)?;
         places.len += programs.spare;
         let sensors = model.contact_sensors();
         let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());

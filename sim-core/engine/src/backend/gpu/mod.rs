@@ -11,7 +11,8 @@
 //! Where contacts can be, hardware has eight threads per world (`kernels::workgroups`). They share the rows of contacts, and each keeps columns of
 //! the solver's system (`sim_physics::step::solver`, `spread`). Classes of contacts of the same trees are merged for that (`kernels::merged`).
 //! Pairs of shapes are tested by blocks, whose loads a thread waits for together (`kernels::blocks`).
-//! Kernels without such work have one thread per world. Sums over threads have a fixed order.
+//! Kernels without such work have one thread per world. Sums over threads have a fixed order. Models of more than 48 dofs have 16 or
+//! 32 threads per world, so that the solver's system stays in registers.
 //!
 //! # Memory
 //! Programs read and write *fields* (`kernels::places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and
@@ -43,6 +44,7 @@ mod create;
 mod frame;
 mod imported;
 mod kernels;
+mod listing;
 mod mirror;
 mod shared;
 mod sharing;
@@ -54,3 +56,4 @@ mod words;
 mod worlds;
 
 pub use create::{Cuts, Wanted, create};
+pub use listing::{KernelListing, Listing, listing};

@@ -111,6 +111,7 @@ use own_rows::own_rows;
 use progress::{Pieces, Plan, Progress, SearchResult};
 use rows::{Acting, Jacobian, along_step, assemble, forces, residual};
 use spread::Spread;
+pub use spread::is_spread;
 use start::choose_start;
 
 /// Accelerations and constraint forces. Where a contact has torsional friction, `TURNS` is true: other models run a
@@ -344,7 +345,7 @@ fn minimize_model<C: Cx, const TURNS: bool>(
         }
         Some(spread) => {
             let w = &mut b.work;
-            spread.solve(cx, m, &w.hessian, &mut w.minimum, &mut b.pull, hold)
+            spread.solve(cx, m, &w.hessian, &mut w.minimum, Some(&mut b.pull), hold)
         }
     };
     // ½ gᵀ H⁻¹ g of bodies in contact, for `f32` alone: the reference goes on, as MuJoCo does

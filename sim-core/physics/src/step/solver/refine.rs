@@ -11,6 +11,7 @@
 
 use super::linear::{Unknown, coupling, solve_system};
 use super::rows::{Acting, Jacobian, assemble, residual};
+use super::spread::Spread;
 use super::{acts, constraint_forces, contacts, gather, may_idle};
 use crate::arrays::Array as A;
 use crate::constants::contact::row;
@@ -125,8 +126,18 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
         // the right-hand side that is assembled with the Hessian is not used
         w.minimum[j] = C::F::c(0.0);
     }
-    // H = M + Jᵀ W J with the pieces that the rows are on at a
-    w.hessian.copy_from_slice(&w.mass_matrix);
+    let touching = contacts::touching(cx, &m.contacts);
+    // as in `solver`, where lanes share a world; torsional friction has no such system
+    let mut classes = m.contacts.classes.iter();
+    let spread = match touching {
+        Some(_) if classes.all(|class| class.turns.is_none()) => Spread::new(cx, m, &w.mass_matrix),
+        _ => None,
+    };
+    // H = M + Jᵀ W J with the pieces that the rows are on at a; a spread system keeps its own M
+    match spread {
+        None => w.hessian.copy_from_slice(&w.mass_matrix),
+        Some(_) => w.hessian.fill(C::F::c(0.0)),
+    }
     residual(
         m,
         Jacobian::new(acting, &w.limit_side, &w.row_jacobian),
@@ -137,9 +148,16 @@ fn correct<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
     assemble(m, &b.params, w, acting, None);
     contacts::residual::<_, true>(cx, &m.contacts, &w.start, row::JAR);
     // a += H⁻¹ missing, then the forces at the new a
-    let touching = contacts::touching(cx, &m.contacts);
-    let coupling = coupling(cx, m, touching);
-    solve_system::<_, true>(cx, m, b, Unknown::Missing, touching, coupling);
+    match spread {
+        None => {
+            let coupling = coupling(cx, m, touching);
+            solve_system::<_, true>(cx, m, b, Unknown::Missing, touching, coupling);
+        }
+        Some(spread) => {
+            let w = &mut b.work;
+            spread.solve(cx, m, &w.hessian, &mut w.missing, None, None);
+        }
+    }
     for (qdd, (start, missing)) in b
         .joint_qdd
         .iter_mut()

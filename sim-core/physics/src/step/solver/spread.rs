@@ -13,8 +13,13 @@ use crate::lane::{Cx, Num};
 use crate::math::factor::inverse;
 use crate::step::constraints::contact_rows::class_list;
 
-/// Most dofs of a system that is spread: its columns are kept in registers.
-const DOFS_MAX: usize = 48;
+/// Most entries of a system that one lane keeps, in registers: 48 dofs with 8 lanes, 96 with 32.
+const ENTRIES_MAX: usize = 288;
+
+/// Whether so many lanes share the columns of a system of so many dofs.
+pub fn is_spread(lanes: usize, dofs: usize) -> bool {
+    lanes > 1 && dofs * dofs.div_ceil(lanes) <= ENTRIES_MAX
+}
 
 /// Of an assembly: J's weight (6) and the force (3) of a contact. Their places are used by searches and by what follows them.
 const WEIGHT: usize = row::AHEAD;
@@ -41,7 +46,7 @@ impl<F: Num> Spread<F> {
     /// Spreads the mass matrix; none where a world has one lane, or the system is too large.
     pub fn new<C: Cx<F = F>>(cx: &mut C, m: &Constants<F::Real>, mass: &[F]) -> Option<Spread<F>> {
         let (lanes, size) = (cx.lanes(), m.dofs.len());
-        if lanes == 1 || size > DOFS_MAX {
+        if !is_spread(lanes, size) {
             return None;
         }
         let groups = size.div_ceil(lanes);
@@ -92,7 +97,7 @@ impl<F: Num> Spread<F> {
     }
 
     /// Solves (M + `joints` + Jᵀ W J) x = `vector` + Jᵀ f, with sums over contacts, held as `hold` says. Leaves the right-hand side in
-    /// `pull`, the solution in `vector`. Returns the largest ratio of diagonal entries of the matrix and M.
+    /// `pull`, the solution in `vector`. Without `pull` there is no Jᵀ f. Returns the largest ratio of diagonal entries of the matrix and M.
     ///
     /// `joints` is packed as the mass matrix.
     pub fn solve<C: Cx<F = F>>(
@@ -101,7 +106,7 @@ impl<F: Num> Spread<F> {
         m: &Constants<F::Real>,
         joints: &[F],
         vector: &mut [F],
-        pull: &mut [C::V],
+        pull: Option<&mut [C::V]>,
         hold: Option<Hold<C>>,
     ) -> F {
         let (size, groups, lanes) = (self.size, self.groups, self.lanes);
@@ -124,12 +129,13 @@ impl<F: Num> Spread<F> {
         }
         // Jᵀ W J and Jᵀ f of contacts are added to both
         for class in 0..m.contacts.classes.len() {
-            self.add_class(cx, &m.contacts, class, &mut cells, &mut sides, hold);
+            let sides = pull.is_some().then_some(&mut sides[..]);
+            self.add_class(cx, &m.contacts, class, &mut cells, sides, hold);
         }
         let mut matrix: Vec<F> = cells.iter().map(|cell| cx.get(cell)).collect();
         let mut side: Vec<F> = sides.iter().map(|cell| cx.get(cell)).collect();
         // the right-hand side, the same in all lanes, before it is eliminated
-        for (dof, pull) in pull.iter_mut().enumerate() {
+        for (dof, pull) in pull.into_iter().flatten().enumerate() {
             let x = self.of_owner(cx, &side, dof);
             cx.put(pull, x);
         }
@@ -145,7 +151,7 @@ impl<F: Num> Spread<F> {
         t: &ContactsOf<C>,
         k: usize,
         cells: &mut [C::V],
-        sides: &mut [C::V],
+        mut sides: Option<&mut [C::V]>,
         hold: Option<Hold<C>>,
     ) {
         let (class, rows) = (&t.classes[k], t.memory.rows);
@@ -197,6 +203,7 @@ impl<F: Num> Spread<F> {
                     product[i] = weight[i][0].fma(jacobian[0], along);
                 }
                 stiff[group] = Some(product);
+                let Some(sides) = &mut sides else { continue };
                 let mut sum = cx.get(&sides[group]);
                 for (x, f) in jacobian.into_iter().zip(force) {
                     sum = x.fma(f, sum);

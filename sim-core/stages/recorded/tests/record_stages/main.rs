@@ -3,6 +3,7 @@
 mod bits;
 #[path = "../../../../../tests/common/cases.rs"]
 mod cases;
+mod several_lanes;
 #[path = "../../../../../tests/common/shapes.rs"]
 mod shapes;
 #[path = "../../../../record/tests/toy/mod.rs"]

@@ -2,10 +2,14 @@
 //!
 //! Physics code iterates natively over classes, and the threads of a world share the rows of one class at a time. So many classes make
 //! long kernels and idle threads: each foot of a quadruped is a class with one contact. Classes of the same trees become one, whose
-//! columns are the dofs of all. A contact's levers are 0 for dofs that do not move its bodies.
+//! columns are the dofs of all. A contact's levers are 0 for dofs that do not move its bodies. Where a robot can touch itself in many
+//! places, as a humanoid can, one class would have mostly zeros: then some stay apart, as long as all their code is short.
 
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::{Class, Column, Contacts, Memory, Run, pair, row};
+use sim_physics::constants::contact::{
+    Class, Column, Contacts, Memory, Pair, Run, pair, row, turning,
+};
+use sim_physics::constants::sensors::{ContactSensor, SensorKind as Kind, TouchSensor};
 use sim_physics::lane::{Fixed, Table};
 use sim_physics::math::factor::UpdatePath;
 use std::borrow::Cow;
@@ -15,41 +19,110 @@ use std::collections::{BTreeMap, BTreeSet};
 /// with.
 const COLUMNS_MAX: usize = 24;
 const WIDER_MAX: usize = 2;
+/// Columns of all classes together, as the solver's code has them: more classes are merged beyond these limits, those first whose contacts
+/// get the fewest zeros. Or twice the dofs, if that is more: one class with the ground and one of the robot with itself have so many.
+const COLUMNS_ALL: usize = 64;
 
 /// The constants with fewer classes of contacts, where that helps.
 pub(in crate::backend::gpu) fn merged(m: &Constants<f64>) -> Cow<'_, Constants<f64>> {
     let t = &m.contacts;
-    // bodies and impedances of MuJoCo's models are listed by class, and so are rows of torsional friction
-    let is_listed = !m.outputs.bodies.is_empty() || !m.contacts.impedances.of_classes.is_empty();
-    let turns = t.classes.iter().any(|class| class.turns.is_some());
-    if is_listed || turns {
-        return Cow::Borrowed(m);
-    }
-    let parts = parts(&t.classes);
+    let parts = parts(&t.classes, COLUMNS_ALL.max(2 * m.dofs.len()));
     if parts.len() == t.classes.len() {
         return Cow::Borrowed(m);
     }
     let mut m = m.clone();
     m.contacts = with_classes(&m, &parts);
+    // sensors of contacts list the classes that they read
+    for sensor in &mut m.sensors.all {
+        if let Kind::Touch(TouchSensor { classes, .. })
+        | Kind::Contact(ContactSensor { classes, .. }) = &mut sensor.kind
+        {
+            let merged: BTreeSet<usize> = classes.iter().map(|&k| new_class(&parts, k)).collect();
+            *classes = merged.into_iter().collect();
+        }
+    }
     Cow::Owned(m)
 }
 
-/// The classes that each new class is made of.
-fn parts(classes: &[Class<f64>]) -> Vec<Vec<usize>> {
-    let mut by_trees: BTreeMap<(Option<usize>, usize), Vec<usize>> = BTreeMap::new();
-    for (k, class) in classes.iter().enumerate() {
-        by_trees.entry(class.trees).or_default().push(k);
-    }
-    let mut parts = Vec::new();
-    for group in by_trees.into_values() {
-        let widest = group.iter().map(|&k| classes[k].columns.len()).max();
-        let wide = columns(classes, &group).len();
-        match wide <= COLUMNS_MAX && wide <= WIDER_MAX * widest.unwrap_or(0) {
-            true => parts.push(group),
-            false => parts.extend(group.into_iter().map(|k| vec![k])),
+/// Classes that become one.
+struct Part {
+    trees: (Option<usize>, usize),
+    classes: Vec<usize>,
+    /// Their dofs, each with its bit.
+    dofs: Vec<u64>,
+    columns: usize,
+    /// Contacts that there may be.
+    contacts: usize,
+}
+
+impl Part {
+    fn new(classes: &[Class<f64>], group: Vec<usize>) -> Part {
+        let columns: Vec<usize> = (group.iter())
+            .flat_map(|&k| classes[k].columns.iter().map(|column| column.dof))
+            .collect();
+        let mut dofs = vec![0; columns.iter().max().map_or(0, |last| last / 64 + 1)];
+        columns
+            .iter()
+            .for_each(|dof| dofs[dof / 64] |= 1 << (dof % 64));
+        Part {
+            trees: classes[group[0]].trees,
+            columns: count(dofs.iter().copied()),
+            dofs,
+            contacts: group.iter().map(|&k| classes[k].capacity).sum(),
+            classes: group,
         }
     }
-    parts
+
+    /// The zeros that contacts of both get if they are merged.
+    fn zeros_with(&self, other: &Part) -> usize {
+        let (long, short) = match self.dofs.len() < other.dofs.len() {
+            true => (&other.dofs, &self.dofs),
+            false => (&self.dofs, &other.dofs),
+        };
+        let more = short.iter().chain(std::iter::repeat(&0));
+        let wide = count(long.iter().zip(more).map(|(a, b)| a | b));
+        (wide - self.columns) * self.contacts + (wide - other.columns) * other.contacts
+    }
+}
+
+fn count(words: impl Iterator<Item = u64>) -> usize {
+    words.map(|word| word.count_ones() as usize).sum()
+}
+
+/// The classes that each new class is made of; those of all have as many columns as `all` together, if that can be.
+fn parts(classes: &[Class<f64>], all: usize) -> Vec<Vec<usize>> {
+    // contacts that move nothing, such as those of a mocap body with the ground, stay apart: some sums leave them out
+    let key = |class: &Class<f64>| (class.columns.is_empty(), class.trees);
+    let mut by_key: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    for (k, class) in classes.iter().enumerate() {
+        by_key.entry(key(class)).or_default().push(k);
+    }
+    let mut parts: Vec<Part> = Vec::new();
+    for group in by_key.into_values() {
+        let widest = group.iter().map(|&k| classes[k].columns.len()).max();
+        let wide = Part::new(classes, group.clone());
+        match wide.columns <= COLUMNS_MAX && wide.columns <= WIDER_MAX * widest.unwrap_or(0) {
+            true => parts.push(wide),
+            false => parts.extend(group.into_iter().map(|k| Part::new(classes, vec![k]))),
+        }
+    }
+    while parts.iter().map(|part| part.columns).sum::<usize>() > all {
+        // those of the same trees follow each other
+        let key = |k: usize| (parts[k].columns == 0, parts[k].trees);
+        let mergeable = (0..parts.len()).flat_map(|a| {
+            let others = (a + 1..parts.len()).take_while(move |&b| key(a) == key(b));
+            others.map(move |b| (a, b))
+        });
+        // the first of those with the fewest zeros
+        let Some((a, b)) = mergeable.min_by_key(|&(a, b)| parts[a].zeros_with(&parts[b])) else {
+            break;
+        };
+        let mut group = parts.remove(b).classes;
+        group.extend(&parts[a].classes);
+        group.sort_unstable();
+        parts[a] = Part::new(classes, group);
+    }
+    parts.into_iter().map(|part| part.classes).collect()
 }
 
 /// Dofs of some classes, rising, and whether they are of the first side's tree.
@@ -61,13 +134,15 @@ fn columns(classes: &[Class<f64>], part: &[usize]) -> Vec<(usize, bool)> {
     columns.into_iter().collect()
 }
 
+/// The new class that has an old one.
+fn new_class(parts: &[Vec<usize>], class: usize) -> usize {
+    let index = parts.iter().position(|part| part.contains(&class));
+    index.expect("every class is part of one")
+}
+
 fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
     let mut t = m.contacts.clone();
     let columns: Vec<_> = parts.iter().map(|part| columns(&t.classes, part)).collect();
-    let new_class = |class: usize| {
-        let index = parts.iter().position(|part| part.contains(&class));
-        index.expect("every class is part of one")
-    };
     // the scalars of pairs, with the levers of the new columns
     let old = t.handles.pair_numbers;
     let widest = columns.iter().map(Vec::len).max().unwrap_or(0);
@@ -77,7 +152,7 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         let first = old.base + p * old.stride;
         let was = &t.classes[pair.class].columns;
         let mut numbers = t.tables.numbers[first..first + pair::LEVERS].to_vec();
-        pair.class = new_class(pair.class);
+        pair.class = new_class(parts, pair.class);
         numbers.extend(columns[pair.class].iter().map(|(dof, _)| {
             let column = was.iter().find(|column| column.dof == *dof);
             column.map_or(0.0, |column| t.tables.numbers[first + column.lever])
@@ -111,14 +186,59 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         .flat_map(|class| [class.first, class.capacity]);
     t.tables.indices.extend(room.map(|x| x as u32));
     t.classes = classes;
+    merge_impedances(&mut t, parts);
+    merge_bodies(&mut t, parts, &m.contacts.pairs);
     let [first_end, capacity_end] = t.row_ends();
+    // as sim-model lays out rows
+    let row_len = match t.classes.iter().any(|class| class.turns.is_some()) {
+        true => row::JACOBIAN + turning::JACOBIAN + 6 * widest,
+        false => row::JACOBIAN + 3 * widest,
+    };
     let rows = Table {
         base: t.memory.rows.base,
-        stride: (row::JACOBIAN + 3 * widest).next_multiple_of(4),
+        stride: row_len.next_multiple_of(4),
         rows: first_end + capacity_end - 2,
     };
     replace_rows(&mut t.memory, rows);
     t
+}
+
+/// Lists the impedances of each new class.
+fn merge_impedances(t: &mut Contacts<f64>, parts: &[Vec<usize>]) {
+    let old = &t.impedances.of_classes;
+    if !old.is_empty() {
+        let of_part = |part: &Vec<usize>| {
+            let kinds: BTreeSet<usize> = part.iter().flat_map(|&k| old[k].clone()).collect();
+            kinds.into_iter().collect()
+        };
+        t.impedances.of_classes = parts.iter().map(of_part).collect();
+    }
+}
+
+/// Lists the bodies of each new class, and gives pairs their places in these lists.
+fn merge_bodies(t: &mut Contacts<f64>, parts: &[Vec<usize>], old_pairs: &[Pair]) {
+    let old = std::mem::take(&mut t.bodies.of_classes);
+    if old.is_empty() {
+        return;
+    }
+    let of_part = |part: &Vec<usize>| {
+        let bodies: BTreeSet<usize> = part.iter().flat_map(|&k| old[k].clone()).collect();
+        bodies.into_iter().collect()
+    };
+    let new: Vec<Vec<usize>> = parts.iter().map(of_part).collect();
+    let places = t.bodies.of_pair;
+    for (p, (pair, was)) in t.pairs.iter().zip(old_pairs).enumerate() {
+        let first = places.base + p * places.stride;
+        for place in &mut t.tables.numbers[first..first + 2] {
+            // counted from 1; 0 is none
+            if *place > 0.0 {
+                let body = old[was.class][*place as usize - 1];
+                let now = new[pair.class].iter().position(|other| *other == body);
+                *place = (now.expect("the list has all bodies of its classes") + 1) as f64;
+            }
+        }
+    }
+    t.bodies.of_classes = new;
 }
 
 /// Gives the rows of contacts another room, and moves what lies behind them.
@@ -206,6 +326,7 @@ fn class(
         shared: shared.collect(),
         first: 0,
         capacity: 0,
-        turns: None,
+        turns: (old.iter().any(|class| class.turns.is_some()))
+            .then_some(row::JACOBIAN + 3 * columns.len()),
     }
 }

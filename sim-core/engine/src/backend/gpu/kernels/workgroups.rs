@@ -1,6 +1,8 @@
 //! Threads per workgroup, and per world. Measured on an H100; other cards were not.
 
 use sim_device::{AdapterInfo, AdapterKind};
+use sim_physics::constants::Constants;
+use sim_physics::step::solver::is_spread;
 use sim_record::wgsl::Exchange;
 
 /// Threads of a subgroup of most GPUs, and of the software driver's workgroups of physics.
@@ -23,12 +25,29 @@ pub(in crate::backend::gpu) fn physics(info: &AdapterInfo) -> u32 {
 const WORLD_THREADS: usize = 8;
 
 /// The threads of a world on an adapter. The software driver computes on the CPU, and more threads only add work there.
-pub(in crate::backend::gpu) fn of_world(info: &AdapterInfo) -> usize {
+pub(in crate::backend::gpu) fn of_world(info: &AdapterInfo, m: &Constants<f64>) -> usize {
     match info.kind {
         AdapterKind::Software => 1,
         _ if !info.shuffles => 1,
-        _ => WORLD_THREADS,
+        // a driver that does not tell its subgroups
+        _ if info.subgroup_max > BOOKKEEPING => for_model(m, SUBGROUP),
+        _ => for_model(m, info.subgroup_min),
     }
+}
+
+/// The threads of a world where subgroups have at least so many: more of them where eight cannot keep the solver's system in registers. A
+/// world stays inside a subgroup. Torsional friction has no system that threads share.
+pub(in crate::backend::gpu) fn for_model(m: &Constants<f64>, subgroup: u32) -> usize {
+    let numbers = [WORLD_THREADS, 2 * WORLD_THREADS, SUBGROUP as usize];
+    let mut fitting = numbers
+        .into_iter()
+        .filter(|threads| *threads <= subgroup as usize);
+    let turns = m.contacts.classes.iter().any(|class| class.turns.is_some());
+    let mut shared = fitting
+        .clone()
+        .filter(|threads| is_spread(*threads, m.dofs.len()));
+    let shared = if turns { None } else { shared.next() };
+    shared.or(fitting.next()).unwrap_or(1)
 }
 
 /// How the threads of a world exchange values.
