@@ -201,6 +201,29 @@ fn a_listing_has_the_instructions_of_each_stage_below_the_lines_that_they_come_f
 }
 
 #[test]
+fn kernels_of_a_gpu_are_listed_on_any_computer() {
+    let list = |name, arguments: &[&str]| run(&["compile"], SCENE, name, arguments, &[]);
+    let table = text(&list("kernels", &["--gpu"]).stdout);
+    let head: Vec<&str> = table.lines().next().unwrap().split_whitespace().collect();
+    assert_eq!(
+        head,
+        ["kernel", "dispatches", "threads", "statements", "bytes"]
+    );
+    let is_kernel = |line: &&str| line.starts_with("step ") || line.starts_with("evaluate ");
+    let kernels = table.lines().filter(is_kernel).count();
+    assert!(
+        kernels > 1 && table.contains("memory of a world: "),
+        "{table}"
+    );
+    let sources = text(&list("kernels-wgsl", &["--gpu", "--listing"]).stdout);
+    assert!(sources.starts_with(&table));
+    assert_eq!(sources.matches("@compute").count(), kernels);
+    let wrong = list("kernels-wrong", &["--gpu", "--lanes=8"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("leave it out"));
+}
+
+#[test]
 fn machine_code_is_compared_with_the_stages_where_the_environment_asks() {
     for (scene, name) in [(falling(), "check"), (SCENE, "check-contacts")] {
         let all = [&QUICK[..], &["--json"]].concat();

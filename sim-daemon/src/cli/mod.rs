@@ -47,10 +47,11 @@ pub(crate) enum CliCommand {
     ///
     /// Example: tightloop bench scene.toml --worlds 4096
     Bench(Box<Bench>),
-    /// Show the machine code that a scene's model becomes, by stage.
+    /// Show the machine code that a scene's model becomes, by stage, or its kernels for a GPU.
     ///
     /// Models without contacts are compiled as a whole. Of small ones with contacts, the stages before contacts are found and
     /// the integrator are. Large models are not compiled. Prints the size of each stage's code; --listing adds the instructions.
+    /// With --gpu it prints the kernels that a hardware GPU gets instead, on any computer.
     ///
     /// Example: tightloop compile scene.toml --listing
     Compile(Compile),
@@ -341,9 +342,13 @@ pub(crate) struct Compile {
     #[arg(long)]
     pub(crate) lanes: Option<usize>,
 
-    /// Print the instructions, each below the line of the physics code that it comes from.
+    /// Print the instructions, each below the line of the physics code that it comes from; of kernels the WGSL.
     #[arg(long)]
     pub(crate) listing: bool,
+
+    /// Show the kernels of a hardware GPU: statements, bytes of SPIR-V, threads per world, dispatches of a frame, memory of a world.
+    #[arg(long)]
+    pub(crate) gpu: bool,
 }
 
 /// Arguments of `top` as given; `top` checks them.
