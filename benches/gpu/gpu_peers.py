@@ -1,12 +1,14 @@
 """MuJoCo-Warp and MJX on the scenes of this bench, where they are installed.
 
     python -m benches gpu_peers --worlds 1024,4096 --scenes grasp --csv FILE
+    python -m benches gpu_peers --scenes out/card/scenes/g1_flat.toml
 
 Needs tightloop (for the scenes) and `mujoco`, and measures those of `mujoco_warp` and `mujoco.mjx` that can be
 imported and have a GPU. It prints why it leaves out the others, and scenes that one of them refuses. The models are
-MuJoCo's, made of the URDF files that main.rs carries. A frame is what it is there: commands of all worlds to the
-device, 8 steps as one recorded graph or one compiled function, then joint positions, velocities and body poses as
-arrays of the host. Columns are those of run.sh, besides the device, the commit and the date.
+MuJoCo's, made of the URDF files that main.rs carries. Of a scene file it is the model beside it (card_scenes.py), with
+room for one and a half times the contacts that MuJoCo finds in its run. A frame is what it is there. Commands of all
+worlds go to the device, which takes its steps as one recorded graph or one compiled function. Joint positions,
+velocities and body poses come back as arrays of the host. Columns are those of run.sh, besides device, commit and date.
 
 Like with like: model, time step, substeps, solver, iterations, cone, single precision, and the commands of world 0. Not
 the same: all worlds are identical here, cubes and commands, and contacts are found by each engine's own means.
@@ -16,7 +18,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import gzip
 import importlib
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -51,7 +55,11 @@ class Plan:
     """A scene: its model, its start, and the controls of each frame; torques are applied, targets are controls."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.applies = name, name == "torque_free"
+        self.name, self.applies, self.substeps = Path(name).stem, name == "torque_free", SUBSTEPS
+        self.room: dict[str, int] = {}
+        if name.endswith(".toml"):
+            self._read(Path(name))
+            return
         if name == "quadruped":
             self.model = legged.rival_of(legged.CASES[0])
             self.start = np.r_[[0, 0, 0, 1, 0, 0, 0], self.model.jnt_range[1:].mean(axis=1)]
@@ -78,10 +86,31 @@ class Plan:
             # MJX refuses pairs of shapes that it does not know, contacts or not
             self.model.geom_contype[:] = self.model.geom_conaffinity[:] = 0
 
+    def _read(self, scene: Path) -> None:
+        """The model and the controls beside a scene file."""
+        binary = gzip.decompress(scene.with_suffix(".mjb.gz").read_bytes())
+        self.model = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": binary})
+        self.start = self.model.key_qpos[0] if self.model.nkey else self.model.qpos0
+        self.rows = np.loadtxt(scene.with_suffix(".csv"), delimiter=",", dtype=np.float32, ndmin=2)
+        substeps = re.search(r"^substeps = (\d+)$", scene.read_text(), re.MULTILINE)
+        assert substeps is not None, f"{scene} has no substeps"
+        self.substeps = int(substeps[1])
+        data, most = self.data(), np.zeros(2)
+        for row in self.rows:
+            data.ctrl[:] = row
+            for _ in range(self.substeps):
+                mujoco.mj_step(self.model, data)
+                most = np.maximum(most, [data.ncon, data.nefc])
+        contacts, rows = (int(1.5 * x) + 16 for x in most)
+        self.room = {"nconmax": contacts, "njmax": rows}
+
     def data(self) -> mujoco.MjData:
         """The start, evaluated."""
         data = mujoco.MjData(self.model)
         data.qpos[:] = self.start
+        if self.model.nkey:
+            data.qvel[:], data.ctrl[:] = self.model.key_qvel[0], self.model.key_ctrl[0]
+            data.act[:] = self.model.key_act[0]
         mujoco.mj_forward(self.model, data)
         return data
 
@@ -101,11 +130,11 @@ def warp(plan: Plan, worlds: int) -> tuple[Frame, Callable[[], None]]:
     mjw, wp = importlib.import_module("mujoco_warp"), importlib.import_module("warp")
     data = plan.data()
     model = mjw.put_model(plan.model)
-    state = mjw.put_data(plan.model, data, nworld=worlds)
+    state = mjw.put_data(plan.model, data, nworld=worlds, **plan.room)
     target = state.qfrc_applied if plan.applies else state.ctrl
 
     def steps() -> None:
-        for _ in range(SUBSTEPS):
+        for _ in range(plan.substeps):
             mjw.step(model, state)
 
     steps()  # compiles
@@ -124,7 +153,8 @@ def warp(plan: Plan, worlds: int) -> tuple[Frame, Callable[[], None]]:
         return state.qpos.numpy(), state.qvel.numpy(), state.xpos.numpy(), state.xquat.numpy()
 
     def reset() -> None:
-        starts = ((state.qpos, plan.start), (state.qvel, data.qvel), (state.qacc_warmstart, data.qacc_warmstart))
+        starts = [(state.qpos, plan.start), (state.qvel, data.qvel), (state.qacc_warmstart, data.qacc_warmstart)]
+        starts += [(state.act, data.act)] if plan.model.na else []
         for array, values in starts:
             wp.copy(array, wp.array(np.tile(np.float32(values), (worlds, 1)), dtype=array.dtype))
 
@@ -140,7 +170,7 @@ def mjx(plan: Plan, worlds: int) -> tuple[Frame, Callable[[], None]]:
 
     def steps(data: Any, command: Any) -> Any:
         data = data.replace(**{name: command})
-        return jax.lax.fori_loop(0, SUBSTEPS, lambda _, data: engine.step(model, data), data)
+        return jax.lax.fori_loop(0, plan.substeps, lambda _, data: engine.step(model, data), data)
 
     run = jax.jit(jax.vmap(steps))
     repeat = jax.jit(jax.vmap(lambda _: start))
@@ -199,7 +229,7 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
                 break
         if not all(np.isfinite(array).all() for array in shown):
             raise ArithmeticError("its worlds are no longer finite")
-    steps = worlds * SUBSTEPS
+    steps = worlds * plan.substeps
     return {
         "scene": plan.name,
         "worlds": worlds,
@@ -251,7 +281,7 @@ def main() -> int:
     """Measure what is there; 1 where nothing is."""
     parser = argparse.ArgumentParser(description="MuJoCo-Warp and MJX on the scenes of benches/gpu.")
     parser.add_argument("--worlds", default="1024,4096,16384,65536", help="numbers of worlds")
-    parser.add_argument("--scenes", default=",".join(SCENES), help="scenes")
+    parser.add_argument("--scenes", default=",".join(SCENES), help="scenes, or scene files that end in .toml")
     parser.add_argument("--seconds", type=float, default=2.0, help="how long each is measured at least")
     parser.add_argument("--csv", type=Path, help="file for the results")
     parser.add_argument("--append", action="store_true", help="add to that file")

@@ -20,14 +20,14 @@ type Times = (String, usize, Vec<f64>);
 pub fn print(sim: &mut Simulation, plan: &Plan, worlds: usize, csv: &Path) -> anyhow::Result<()> {
     let mut words = vec![0; sim.layout().bytes / 8];
     let crowd = WorldSet::all(worlds);
-    let commands = plan.commands(&crowd);
+    let commands = plan.commands(&crowd, usize::MAX);
     let mut programs: Vec<Times> = Vec::new();
     let mut host = [0.0; 2];
     plan.start(sim, &crowd);
     wake(sim, &mut words);
     for (frame, values) in commands.iter().enumerate() {
         let begin = Instant::now();
-        sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
+        sim.command(plan.field, 0..plan.columns(), Values::F32(values))?;
         let commanded = Instant::now();
         sim.step(&mut words);
         let done = Instant::now();

@@ -3,6 +3,7 @@
 //! One binary that needs a Vulkan driver and nothing else; benches/gpu/run.sh builds it, or takes the one that lies beside it.
 //! If a run deviates from MuJoCo's, if bits depend on the number of worlds, or if a device is lost, it prints no results and exits with 1.
 
+mod agreement;
 mod arguments;
 mod build_time;
 mod checks;
@@ -91,7 +92,7 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
     let csv = arguments.csv.as_deref();
     let mut report = Report::new(info, &arguments.fact, csv, arguments.append)?;
     if arguments.checks != Checks::Skip {
-        checks::check(place, &arguments.scenes, &arguments.check_worlds)?;
+        checks::check(place, arguments)?;
     }
     if arguments.checks == Checks::Only {
         return Ok(());
@@ -100,8 +101,8 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
         return time_kernels(arguments, place, csv);
     }
     report.head();
-    for &scene in &arguments.scenes {
-        let plan = Plan::new(scene);
+    for scene in &arguments.scenes {
+        let plan = arguments.plan(scene)?;
         // it is the scene's, and stands in its first row
         let mut replay = match arguments.brief || arguments.side == Side::Cpu {
             true => None,
@@ -120,7 +121,7 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
                 _ => Some(on_cpu(arguments, place, &plan, worlds)?),
             };
             report.add(Row {
-                scene: plan.scene,
+                scene: plan.scene.clone(),
                 worlds,
                 dofs: plan.model.dofs(),
                 substeps: plan.model.substeps(),
@@ -139,8 +140,8 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
 
 /// The programs of all scenes, timed on the device.
 fn time_kernels(arguments: &Arguments, place: &Place, csv: &Path) -> anyhow::Result<()> {
-    for &scene in &arguments.scenes {
-        let plan = Plan::new(scene);
+    for scene in &arguments.scenes {
+        let plan = arguments.plan(scene)?;
         for &worlds in &arguments.worlds {
             let options = Options {
                 replay: Replay::Timed,
@@ -204,7 +205,7 @@ fn on_gpu(
 ) -> anyhow::Result<GpuSide> {
     let cold_and_cached_s = match arguments.brief {
         true => None,
-        false => Some(build_time::build_twice(info, plan.scene, worlds)?),
+        false => Some(build_time::build_twice(info, &plan.scene, worlds)?),
     };
     let wanted = Duration::from_secs_f64(arguments.seconds);
     let crowd = WorldSet::all(worlds);

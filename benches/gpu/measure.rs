@@ -31,10 +31,10 @@ impl Frames {
         words: &mut [u64],
         wanted: Duration,
     ) -> anyhow::Result<Frames> {
-        let commands = plan.commands(crowd);
+        let commands = plan.commands(crowd, usize::MAX);
         plan.start(sim, crowd);
         for values in commands.iter().take(WARM_UP) {
-            sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
+            sim.command(plan.field, 0..plan.columns(), Values::F32(values))?;
             sim.step(words);
         }
         let mut frames = Frames::default();
@@ -44,12 +44,12 @@ impl Frames {
             wake(sim, words);
             for (frame, values) in commands.iter().enumerate() {
                 let (wall, thread) = (Instant::now(), thread_seconds());
-                sim.command(plan.field, 0..plan.model.dofs(), Values::F32(values))?;
+                sim.command(plan.field, 0..plan.columns(), Values::F32(values))?;
                 sim.step(words);
                 frames.thread.push(thread_seconds() - thread);
                 frames.wall.push(wall.elapsed().as_secs_f64());
                 spent += frames.wall[frames.wall.len() - 1];
-                if spent > (wanted * PATIENCE).as_secs_f64() && frame + 1 < plan.frames() {
+                if spent > (wanted * PATIENCE).as_secs_f64() && frame + 1 < commands.len() {
                     frames.is_cut = true;
                     break;
                 }

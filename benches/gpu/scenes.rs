@@ -1,12 +1,15 @@
-//! Five scenes, the commands of their frames, and how worlds differ.
+//! Five scenes and those of files, the commands of their frames, and how worlds differ.
 
 use crate::common::{Demo, FRAMES, command, lesson, lesson_with_table, noise, numbers};
 use crate::robots::{self, Case};
-use clap::ValueEnum;
+use anyhow::{Context, ensure};
 use sim_engine::backend::Values;
 use sim_engine::simulation::Simulation;
-use sim_model::{Description, Model};
+use sim_model::{Description, KeyState, Model};
 use sim_physics::arrays::Field;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Arc;
 
 /// Half of the square within which a cube is put [m], about its place in the record: what examples/franka_grasp.py draws from.
@@ -19,8 +22,7 @@ const STAND: [f64; 3] = [0.0, 0.8, -1.6];
 const HEIGHT: f64 = 0.32;
 
 /// A scene by its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// The lesson's arm under a torque, nothing to touch.
     TorqueFree,
@@ -32,17 +34,58 @@ pub enum Scene {
     Quadruped,
     /// The same robot on the ground, stepping in place.
     Standing,
+    /// A scene file.
+    File(PathBuf),
+}
+
+impl FromStr for Scene {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Scene, String> {
+        if text.ends_with(".toml") {
+            return Ok(Scene::File(PathBuf::from(text)));
+        }
+        let known = [
+            Scene::TorqueFree,
+            Scene::Target,
+            Scene::Grasp,
+            Scene::Quadruped,
+            Scene::Standing,
+        ];
+        let names: Vec<&str> = known.iter().map(Scene::name).collect();
+        match names.iter().position(|name| *name == text) {
+            Some(place) => Ok(known[place].clone()),
+            None => Err(format!(
+                "unknown; give a scene file that ends in .toml, or {}",
+                names.join(", ")
+            )),
+        }
+    }
 }
 
 impl Scene {
-    /// Its name on the command line and in results.
-    pub fn name(self) -> &'static str {
+    /// Its name in results; of the five, on the command line too.
+    pub fn name(&self) -> &str {
         match self {
+            Scene::File(path) => path
+                .file_stem()
+                .and_then(|stem| stem.to_str())
+                .unwrap_or("scene"),
             Scene::TorqueFree => "torque_free",
             Scene::Target => "target",
             Scene::Grasp => "grasp",
             Scene::Quadruped => "quadruped",
             Scene::Standing => "standing",
+        }
+    }
+}
+
+impl Scene {
+    /// As the command line has it.
+    pub fn argument(&self) -> &OsStr {
+        match self {
+            Scene::File(path) => path.as_os_str(),
+            other => OsStr::new(other.name()),
         }
     }
 }
@@ -121,16 +164,19 @@ pub struct Plan {
     rows: Vec<Vec<f32>>,
     /// About which the worlds' commands differ.
     rest: Vec<f32>,
+    /// Where worlds begin, if not at the scene's start.
+    begin: Option<KeyState>,
 }
 
 impl Plan {
     /// Compiles the scene.
-    pub fn new(scene: Scene) -> Plan {
+    pub fn new(scene: &Scene) -> anyhow::Result<Plan> {
         let lessons = |demo: Demo| -> Vec<Vec<f64>> {
             let frames = 0..FRAMES;
             frames.map(|f| command(demo, f).1.to_vec()).collect()
         };
         let (description, field, rows, rest) = match scene {
+            Scene::File(path) => return Plan::of_file(scene, path),
             Scene::TorqueFree => {
                 let rest = vec![0.0; ARM];
                 (
@@ -189,13 +235,49 @@ impl Plan {
             }
         };
         let single = |row: &Vec<f64>| row.iter().map(|x| *x as f32).collect();
-        Plan {
-            scene,
-            model: description.compile().expect("the scene compiles"),
+        Ok(Plan {
+            scene: scene.clone(),
+            model: description.compile()?,
             field,
             rows: rows.iter().map(single).collect(),
             rest: single(&rest),
-        }
+            begin: None,
+        })
+    }
+
+    /// The scene of a file; controls of its frames are the rows of the file beside it that ends in .csv. Worlds begin in the first
+    /// keyframe, if there is any.
+    fn of_file(scene: &Scene, path: &Path) -> anyhow::Result<Plan> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let model = sim_daemon::config::load(path)?
+            .describe(folder)?
+            .compile()?;
+        let controls = path.with_extension("csv");
+        let text = std::fs::read_to_string(&controls)
+            .with_context(|| format!("{}: a row of controls per frame", controls.display()))?;
+        let rows = numbers(&text);
+        let columns = model.constants().actuators.all.len();
+        ensure!(
+            !rows.is_empty() && rows.iter().all(|row| row.len() == columns),
+            "{}: give rows of {columns} controls",
+            controls.display()
+        );
+        let mean = |k| rows.iter().map(|row| row[k]).sum::<f64>() / rows.len() as f64;
+        Ok(Plan {
+            scene: scene.clone(),
+            begin: model.keyframes().first().cloned(),
+            model,
+            field: Field::Ctrl,
+            rest: (0..columns).map(|k| mean(k) as f32).collect(),
+            rows: (rows.iter())
+                .map(|row| row.iter().map(|x| *x as f32).collect())
+                .collect(),
+        })
+    }
+
+    /// Columns of its commands.
+    pub fn columns(&self) -> usize {
+        self.rows[0].len()
     }
 
     /// Frames of a run.
@@ -206,6 +288,18 @@ impl Plan {
     /// Puts the worlds where they begin.
     pub fn start(&self, sim: &mut Simulation, crowd: &WorldSet) {
         sim.reset(None, None).expect("a reset without a mask fits");
+        if let Some(key) = &self.begin {
+            let written = [
+                (Field::JointQ, &key.joint_q),
+                (Field::JointQd, &key.joint_qd),
+                (Field::Act, &key.act),
+            ];
+            for (field, row) in written.into_iter().filter(|(_, row)| !row.is_empty()) {
+                let all = row.repeat(crowd.len());
+                sim.write(field, 0..row.len(), Values::F64(&all), None)
+                    .expect("a keyframe of its model");
+            }
+        }
         if self.scene != Scene::Grasp {
             return;
         }
@@ -224,27 +318,19 @@ impl Plan {
             .expect("the cube's coordinates");
     }
 
-    /// The commands of all frames, made ahead: a GPU that waits for them in each frame lowers its clocks.
-    pub fn commands(&self, crowd: &WorldSet) -> Vec<Vec<f32>> {
-        let frames = 0..self.frames();
-        let commands = frames.map(|frame| {
-            let mut values = Vec::with_capacity(crowd.len() * self.model.dofs());
-            self.fill(frame, crowd, &mut values);
-            values
-        });
-        commands.collect()
+    /// The commands of the first frames, `(worlds, columns)` each, made ahead: a GPU that waits for them in each frame lowers its clocks.
+    pub fn commands(&self, crowd: &WorldSet, frames: usize) -> Vec<Vec<f32>> {
+        let frames = 0..frames.min(self.frames());
+        frames.map(|frame| self.row(frame, crowd)).collect()
     }
 
-    /// The commands of a frame, `(worlds, dofs)`: of the grasp the recorded ones, otherwise of an amplitude of each world's own.
-    pub fn fill(&self, frame: usize, crowd: &WorldSet, values: &mut Vec<f32>) {
-        values.clear();
+    /// The commands of a frame: of the grasp the recorded ones, otherwise of an amplitude of each world's own.
+    fn row(&self, frame: usize, crowd: &WorldSet) -> Vec<f32> {
         let row = &self.rows[frame];
         if self.scene == Scene::Grasp {
-            for _ in 0..crowd.len() {
-                values.extend_from_slice(row);
-            }
-            return;
+            return row.repeat(crowd.len());
         }
+        let mut values = Vec::with_capacity(crowd.len() * row.len());
         for amplitude in crowd.amplitudes() {
             let both = row.iter().zip(&self.rest);
             // world 0 is as recorded, to the bit
@@ -253,5 +339,6 @@ impl Plan {
                 _ => rest + amplitude * (x - rest),
             }));
         }
+        values
     }
 }

@@ -18,6 +18,20 @@ REPOSITORY = Path(__file__).parents[3]
 BINARY = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "release/examples/gpu_bench"
 COMMAND = "cargo build --release --workspace --example gpu_bench"
 PATIENCE = 300.0  # [s]
+# A scene like those of MuJoCo's models: a ball on an arm that hits the ground
+TINY = """
+<mujoco>
+  <option timestep="0.005"/>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body pos="0 0 0.25">
+      <joint name="swing" axis="0 1 0" damping="0.01"/>
+      <geom type="sphere" pos="0.2 0 0" size="0.1" mass="0.1"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="swing" ctrlrange="-1 1"/></actuator>
+</mujoco>
+"""
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +39,12 @@ def card(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder that such a machine gets."""
     if not BINARY.exists():
         pytest.fail(f"there is no {BINARY}; run `{COMMAND}`, as `make test` does")
-    folder = tmp_path_factory.mktemp("machine") / "card"
-    subprocess.run([REPOSITORY / "benches/gpu/card_folder.sh", folder], check=True)
-    return folder
+    folder, scenes = (tmp_path_factory.mktemp(name) for name in ("machine", "scenes"))
+    code = "import sys; from card_scenes import *; model = mujoco.MjModel.from_xml_string(sys.argv[1])\n"
+    code += "write(Path(sys.argv[2]), 'tiny', model, 2, np.sin(np.arange(20.0))[:, None])"
+    subprocess.run([sys.executable, "-c", code, TINY, scenes], cwd=REPOSITORY / "benches/gpu", check=True)
+    subprocess.run([REPOSITORY / "benches/gpu/card_folder.sh", folder / "card", scenes], check=True)
+    return folder / "card"
 
 
 def command(card: Path, results: Path, *stages: int, **variables: str) -> tuple[list[str], dict[str, str]]:
@@ -98,18 +115,19 @@ def test_a_call_that_was_killed_in_a_stage_goes_on_from_there_and_the_results_ar
             assert time.monotonic() < until
             time.sleep(0.02)
     before = keys(results)
-    assert before == ["1/torque_free", "2/torque_free-64"]
+    assert before == ["1/torque_free", "1/tiny", "2/torque_free-64"]
     assert [row["worlds"] for row in rows(results / "speed.csv")] == ["64"]
 
     done = run(card, results, CARD_COPY=str(copy))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert keys(results)[:2] == before and len(set(keys(results))) == len(keys(results))
+    assert keys(results)[:3] == before and len(set(keys(results))) == len(keys(results))
     head = [line for line in (results / "speed.csv").read_text().splitlines() if line.startswith("# ")]
     for fact in ("adapter", "driver", "commit", "date", "clocks before"):
         assert any(line.startswith(f"# {fact}: ") for line in head), fact
     measured = rows(results / "speed.csv")
-    sides = [(row["worlds"], row["steps_per_s"] == "–") for row in measured]
-    assert sides == [("64", False), ("1024", False), ("64", True), ("1024", True)]
+    sides = [(row["scene"], row["worlds"], row["steps_per_s"] == "–") for row in measured]
+    counts = [(scene, worlds) for worlds in ("64", "1024") for scene in ("torque_free", "tiny")]
+    assert sides == [(*count, is_cpu) for is_cpu in (False, True) for count in counts]
     splits = rows(results / "splits.csv")
     assert [(row["world_threads"], row["kernel_size"]) for row in splits] == [
         ("auto", "auto"),
@@ -119,7 +137,10 @@ def test_a_call_that_was_killed_in_a_stage_goes_on_from_there_and_the_results_ar
     assert int(splits[2]["kernels"]) > int(splits[0]["kernels"])
     assert "# not measured: " in (results / "tensors.csv").read_text() and "tensors: not measured: " in done.stdout
     assert {row["engine"] for row in rows(results / "published.csv")} == {"mujoco_warp"}
-    assert "same bits among 1, 7, 16 and 64 worlds" in (results / "log.txt").read_text()
+    log = (results / "log.txt").read_text()
+    for scene in ("torque_free", "tiny"):
+        assert f"{scene}: same bits among 1, 7, 16 and 64 worlds" in log
+    assert "tiny: after 5 frames within " in log
     names = sorted(path.name for path in results.iterdir())
     assert names == sorted(path.name for path in copy.iterdir())
     stages = ("speed.csv", "splits.csv", "tensors.csv", "profile.txt", "published.csv")
