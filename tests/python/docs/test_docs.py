@@ -78,7 +78,7 @@ def test_blocks_that_do_not_run_say_why():
         "needs a compiler": 3,
         "needs a network": 2,
         "needs a notebook": 1,
-        "needs a scene file of yours": 1,
+        "needs a scene file of yours": 2,
         "needs an NVIDIA GPU": 1,
         "needs docker": 1,
         "needs jax": 3,
