@@ -23,6 +23,7 @@ use sim_model::Model;
 use sim_physics::arrays::{Array, Layout};
 use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
+use sim_physics::step::StageId;
 use sim_record::split::{Limits, Prices};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -77,6 +78,23 @@ pub(super) fn constants(model: &Model, threads: usize) -> Constants<f32> {
         1 => model.constants().cast(),
         _ => with_blocks(merged(model.constants())).cast(),
     }
+}
+
+/// The programs of frames with this layout, where their numbers lie, and the stages of the evaluation.
+pub(super) fn programs(
+    m: &Constants<f32>,
+    layout: &Layout,
+    substeps: usize,
+    how: How,
+) -> Result<(Programs, Places, Vec<StageId>), BackendError> {
+    let computed = show::computed(layout);
+    let mut places = Places::new(m, &computed);
+    let fields = layout.slots.iter().map(|slot| slot.field);
+    let shown = evaluation_stages(m, fields.clone());
+    let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
+    let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, how)?;
+    places.len += programs.spare;
+    Ok((programs, places, shown))
 }
 
 /// What a caller asks of a GPU, besides a model and its worlds.
@@ -148,20 +166,13 @@ impl Gpu {
             asked_threads.unwrap_or_else(|| workgroups::of_world(device.info(), model.constants()));
         let constants = constants(model, threads);
         let m = &constants;
-        let computed = show::computed(layout);
-        let mut places = Places::new(m, &computed);
-        let fields = layout.slots.iter().map(|slot| slot.field);
-        let shown = evaluation_stages(m, fields.clone());
-        let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
         let info = device.info();
         let how = How {
             limits: limits(info, threads, asked.cuts),
             lanes: threads,
             exchange: workgroups::exchange(info),
         };
-        let substeps = model.substeps();
-        let programs = Programs::new(m, &places, substeps, &shown, &computed, &wanted, how)?;
-        places.len += programs.spare;
+        let (programs, places, shown) = programs(m, layout, model.substeps(), how)?;
         let sensors = model.contact_sensors();
         let shapes = sensors.first().map_or(0, |sensor| sensor.of.len());
         let frame_s = model.substeps() as f64 * model.dt();

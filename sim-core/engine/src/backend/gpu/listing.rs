@@ -1,15 +1,13 @@
 //! The kernels that a model becomes on a hardware GPU, for people and for tests. No adapter is needed.
 
 use super::compiled::dispatches_of;
-use super::create::{HARDWARE, constants};
-use super::kernels::places::Places;
-use super::kernels::programs::{How, KernelSequence, Programs};
-use super::kernels::{show, workgroups};
+use super::create::{HARDWARE, constants, programs};
+use super::kernels::programs::{How, KernelSequence, KernelSource};
+use super::kernels::workgroups;
 use crate::backend::BackendError;
 use sim_device::{Source, translated};
 use sim_model::Model;
-use sim_physics::arrays::{Array, Layout};
-use sim_physics::schedule::evaluation_stages;
+use sim_physics::arrays::Layout;
 use sim_record::wgsl::Exchange;
 
 /// What a hardware GPU is given of a model.
@@ -52,37 +50,24 @@ pub fn listing(
     let threads = world_threads
         .unwrap_or_else(|| workgroups::for_model(model.constants(), workgroups::SUBGROUP));
     let m = &constants(model, threads);
-    let computed = show::computed(layout);
-    let places = Places::new(m, &computed);
-    let fields = layout.slots.iter().map(|slot| slot.field);
-    let shown = evaluation_stages(m, fields.clone());
-    let wanted: Vec<Array> = fields.flat_map(show::copied).collect();
     let how = How {
         limits: HARDWARE,
         lanes: threads,
         exchange: Exchange::Subgroup,
     };
-    let programs = Programs::new(
-        m,
-        &places,
-        model.substeps(),
-        &shown,
-        &computed,
-        &wanted,
-        how,
-    )?;
+    let (programs, places, _) = programs(m, layout, model.substeps(), how)?;
     let mut kernels = listed("step", programs.step)?;
     kernels.extend(listed("evaluate", programs.evaluate)?);
     Ok(Listing {
         kernels,
-        fields_bytes: 4 * (places.len + programs.spare) as usize,
+        fields_bytes: 4 * places.len as usize,
         contacts_bytes: 4 * m.contacts.memory.len,
     })
 }
 
 fn listed(name: &str, sequence: KernelSequence) -> Result<Vec<KernelListing>, BackendError> {
     let KernelSequence { kernels, order } = sequence;
-    let list = |(k, kernel): (usize, super::kernels::programs::KernelSource)| {
+    let list = |(k, kernel): (usize, KernelSource)| {
         let label = format!("{name} {k}");
         let source = Source {
             label: label.clone(),
