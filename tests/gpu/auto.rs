@@ -1,6 +1,7 @@
 //! The choice of `auto`: by measured rates, which are kept.
 
 use crate::common::{Run, drawn};
+use crate::lost::compiled;
 use crate::{assert_alive, gpu, options};
 use sim_engine::backend::cpu::available;
 use sim_engine::options::{AUTO_WORLDS, AdapterKind, adapters, lose_after};
@@ -293,6 +294,7 @@ fn a_processor_that_fails_leaves_the_worlds_to_the_gpu() {
     };
     let failure = Simulation::new(falling(1.0), &none).err().unwrap();
     assert!(failure.to_string().contains("this processor has no"));
+    compiled();
 }
 
 #[test]

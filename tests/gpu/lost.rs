@@ -105,7 +105,7 @@ fn a_device_that_is_lost_at_any_point_of_the_start_is_an_error() {
 }
 
 /// Waits for a driver that was given up: a process must not end while it compiles.
-fn compiled() {
+pub fn compiled() {
     while compiling() > 0 {
         std::thread::sleep(Duration::from_millis(10));
     }
