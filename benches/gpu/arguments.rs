@@ -69,6 +69,9 @@ pub struct Arguments {
     /// Leaves out what needs more builds: cold and cached ones, and the comparison of recorded with encoded batches.
     #[arg(long)]
     pub brief: bool,
+    /// Measures the power of the card for so long [s], where NVIDIA's driver counts energy.
+    #[arg(long)]
+    pub power: Option<f64>,
     /// Folder that keeps programs from call to call.
     #[arg(long)]
     pub cache: Option<PathBuf>,

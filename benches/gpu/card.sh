@@ -9,7 +9,7 @@
 #
 # stage                                              at most [s]   result
 #   1  results beside MuJoCo; bits for 1 to 65,536 worlds    420   log.txt
-#   2  speed of all scenes, commands to arrays               900   speed.csv
+#   2  speed of all scenes, commands to arrays; energy       900   speed.csv
 #   3  threads per world, cuts of kernels                    240   splits.csv
 #   4  tensors without copies                                 90   tensors.csv
 #   5  time stamps of the kernels, what the profiler sees    240   profile.txt
@@ -221,7 +221,7 @@ measured() { gpu "$1" --checks skip --brief --side "$2" --scenes "$(as_file "$3"
 
 stage_2() {
   for worlds in $counts; do
-    for scene in $scenes; do measured "2/$scene-$worlds" gpu "$scene" "$worlds" --csv "$results/speed.csv"; done
+    for scene in $scenes; do measured "2/$scene-$worlds" gpu "$scene" "$worlds" --csv "$results/speed.csv" --power "$seconds"; done
   done
 }
 

@@ -3,8 +3,9 @@
 #
 #   benches/gpu/card_folder.sh FOLDER SCENES [WHEEL...]
 #
-# It takes the built gpu_bench, the wheel of .venv, the scenes of card_scenes.py, and other wheels, such as those of mujoco and
-# mujoco-mjx for the machine's Python. CARD_MOST is another limit [MB]: the wheel of warp-lang, which MuJoCo-Warp needs, is larger.
+# It takes the built gpu_bench, the wheel of .venv, the scenes of card_scenes.py, and other wheels: such as those of mujoco and
+# mujoco-mjx for the machine's Python, and of nvidia-ml-py for the energy of both. CARD_MOST is another limit [MB]: the wheel of
+# warp-lang, which MuJoCo-Warp needs, is larger.
 set -eu
 folder=$1 scenes=$2
 shift 2

@@ -64,7 +64,9 @@ def summary(results: Path) -> None:
         row["cpu_steps_per_s"] = cpu.get((row["scene"], row["worlds"]), "–")
         if row["cpu_steps_per_s"] != "–":
             row["gpu_over_cpu"] = f"{float(row['steps_per_s']) / float(row['cpu_steps_per_s']):.2f}"
-    columns = "scene worlds kernels build_s steps_per_s steps_per_s_whole frame_p50_ms cpu_steps_per_s gpu_over_cpu"
+    columns = (
+        "scene worlds kernels build_s steps_per_s steps_per_s_whole energy_uj frame_p50_ms cpu_steps_per_s gpu_over_cpu"
+    )
     show("speed", gpu, columns.split())
     columns = "scene worlds world_threads kernel_size dispatch_price kernels dispatches build_s steps_per_s"
     show("threads per world, cuts of kernels", read(results / "splits.csv"), columns.split())
@@ -75,7 +77,7 @@ def summary(results: Path) -> None:
         show("tensors, time of a frame", read(results / "tensors.csv"), ("worlds", "views_us", "tensors_us"))
     peers = read(results / "peers.csv")
     if peers:
-        show("peers", peers, ("scene", "worlds", "side", "device", "steps_per_s"))
+        show("peers", peers, ("scene", "worlds", "side", "device", "steps_per_s", "energy_uj"))
     else:
         title = "peers: not measured here; published for other scenes and cards"
         show(title, read(results / "published.csv"), ("engine", "scene", "card", "worlds", "steps_per_s"))

@@ -206,7 +206,41 @@ def mjx_device() -> tuple[str, bool]:
 DEVICES = {"mujoco_warp": warp_device, "mujoco.mjx": mjx_device}
 
 
-def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str | int]:
+def meter(device: str) -> Callable[[], float | None]:
+    """Reads the energy that the only card of a name has taken [J], once its driver updates it, some ten times a second.
+
+    It reads none without `nvidia-ml-py` and NVIDIA's driver.
+    """
+    try:
+        counters = importlib.import_module("pynvml")
+    except ImportError:
+        return lambda: None
+    try:
+        counters.nvmlInit()
+        cards = [counters.nvmlDeviceGetHandleByIndex(k) for k in range(counters.nvmlDeviceGetCount())]
+        cards = [card for card in cards if counters.nvmlDeviceGetName(card) == device]
+        if len(cards) != 1:
+            print(f"energy is not measured: {len(cards)} cards are called {device}")
+            return lambda: None
+        counters.nvmlDeviceGetTotalEnergyConsumption(cards[0])
+    except counters.NVMLError as error:
+        print(f"energy is not measured: {error}")
+        return lambda: None
+
+    def read() -> float | None:
+        before, since = counters.nvmlDeviceGetTotalEnergyConsumption(cards[0]), time.perf_counter()
+        while time.perf_counter() - since < 1.0:
+            now = counters.nvmlDeviceGetTotalEnergyConsumption(cards[0])
+            if now != before:
+                return 1e-3 * now
+        return None
+
+    return read
+
+
+def measure(
+    plan: Plan, side: str, worlds: int, seconds: float, energy: Callable[[], float | None]
+) -> dict[str, str | int]:
     """A row: whole runs from the start until the seconds are over."""
     begin = time.perf_counter()
     frame, reset = SIDES[side](plan, worlds)
@@ -218,6 +252,7 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
         frame(row)
     times: list[float] = []
     is_cut, shown = False, ()
+    before, since = energy(), time.perf_counter()
     while sum(times) < seconds and not is_cut:
         reset()
         for row in commands:
@@ -230,6 +265,9 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
         if not all(np.isfinite(array).all() for array in shown):
             raise ArithmeticError("its worlds are no longer finite")
     steps = worlds * plan.substeps
+    after = energy()
+    taken = None if before is None or after is None else after - before
+    spent = time.perf_counter() - since
     return {
         "scene": plan.name,
         "worlds": worlds,
@@ -238,6 +276,8 @@ def measure(plan: Plan, side: str, worlds: int, seconds: float) -> dict[str, str
         "cold_s": f"{cold:.2f}",
         "steps_per_s": f"{steps / np.median(times):.0f}",
         "steps_per_s_whole": f"{steps * len(times) / sum(times):.0f}",
+        "power_w": "–" if taken is None else f"{taken / spent:.0f}",
+        "energy_uj": "–" if taken is None else f"{1e6 * taken / (steps * len(times)):.2f}",
         "frame_p50_ms": f"{1e3 * np.median(times):.3f}",
         "frame_p99_ms": f"{1e3 * np.quantile(times, 0.99):.3f}",
         "frames": len(times),
@@ -295,10 +335,11 @@ def main() -> int:
         print(*sides)
         return int(not sides)
     for side, device in sides.items():
+        energy = meter(device.removesuffix(" (gpu)").removesuffix(" (cuda)"))
         for name in arguments.scenes.split(","):
             for worlds in map(int, arguments.worlds.split(",")):
                 try:
-                    row = measure(Plan(name), side, worlds, arguments.seconds) | {"device": device} | of_all
+                    row = measure(Plan(name), side, worlds, arguments.seconds, energy) | {"device": device} | of_all
                 except Exception as error:  # each engine refuses in its own way
                     print(f"{side} does not run {name} with {worlds} worlds: {type(error).__name__}: {error}")
                     continue

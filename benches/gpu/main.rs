@@ -12,6 +12,7 @@ mod common;
 mod kernel_times;
 mod measure;
 mod pages;
+mod power;
 mod report;
 #[path = "../robots/mod.rs"]
 mod robots;
@@ -22,6 +23,7 @@ use arguments::{Arguments, Checks, Side};
 use clap::Parser;
 use measure::Frames;
 use pages::Pages;
+use power::Meter;
 use report::{GpuSide, Report, Row};
 use scenes::{Plan, WorldSet};
 use sim_engine::options::{Adapter, AdapterInfo, Cuts, Replay, adapters};
@@ -220,7 +222,21 @@ fn on_gpu(
     let imported = imports
         .then(|| Frames::measure(&mut sim, plan, &crowd, pages.words(), wanted))
         .transpose()?;
+    let words = if imports {
+        pages.words()
+    } else {
+        &mut heap[..]
+    };
+    let meter = arguments.power.and_then(|_| Meter::new(&info.name));
+    let power = match meter.zip(arguments.power) {
+        Some((meter, seconds)) => {
+            let wanted = Duration::from_secs_f64(seconds);
+            meter.measure(&mut sim, plan, &crowd, words, wanted)?
+        }
+        None => None,
+    };
     Ok(GpuSide {
+        power,
         programs: sim.programs().to_vec(),
         build_s,
         cold_and_cached_s,

@@ -1,6 +1,7 @@
 //! Results: printed, and written to a file.
 
 use crate::measure::Frames;
+use crate::power::Power;
 use crate::scenes::Scene;
 use anyhow::{Context, ensure};
 use sim_engine::options::{AdapterInfo, Cuts};
@@ -35,6 +36,8 @@ pub struct GpuSide {
     pub imported: Option<Frames>,
     /// Processor time of the thread that asks for a frame, its batches recorded and encoded each time [µs].
     pub replay: Option<[f64; 2]>,
+    /// Where the driver counts energy.
+    pub power: Option<Power>,
 }
 
 impl GpuSide {
@@ -68,6 +71,7 @@ impl Row {
         let of_frames = |f: &dyn Fn(&Frames) -> f64, digits| or_dash(frames.map(f), digits);
         let builds = gpu.and_then(|gpu| gpu.cold_and_cached_s);
         let replay = gpu.and_then(|gpu| gpu.replay);
+        let power = gpu.and_then(|gpu| gpu.power.as_ref());
         let rate = frames.map(|frames| frames.rate(steps));
         let cpu = self.cpu.as_ref().map(|cpu| cpu.rate(steps));
         let asked = |x: Option<usize>| x.map_or("auto".to_owned(), |x| x.to_string());
@@ -96,6 +100,11 @@ impl Row {
             (
                 "steps_per_s_whole",
                 of_frames(&|frames| frames.whole_rate(steps), 0),
+            ),
+            ("power_w", or_dash(power.map(|power| power.watts), 0)),
+            (
+                "energy_uj",
+                or_dash(power.map(|power| 1e6 * power.frame_j / steps as f64), 2),
             ),
             ("frame_p50_ms", of_frames(&|frames| frames.wall_ms(0.5), 3)),
             ("frame_p99_ms", of_frames(&|frames| frames.wall_ms(0.99), 3)),
@@ -239,6 +248,7 @@ impl Report {
             "\ncold: until the first frame is there, in a process of its own for which neither we nor the driver have kept anything;\n\
              cached: in a process after it. Drivers that keep what they compile elsewhere than Mesa's and NVIDIA's are not cold.\n\
              steps/s: physics steps of all worlds in the median frame, commands to arrays; `staged ms`: the median frame where the host copies it.\n\
+             power_w, energy_uj in the file: mean power of the card in runs one after the other [W], and energy per step [µJ].\n\
              submit: processor time of the thread that asks for a frame; `replay`: the same for 64 worlds with batches encoded each time, over that with recorded ones.\n\
              CPU: the same worlds, commands and fields on all cores of this machine, f32 as well; ratio: the GPU's steps/s over the CPU's."
         );
