@@ -15,6 +15,7 @@ mod layer;
 mod lost;
 mod models;
 mod programs;
+mod room;
 mod same_bits;
 mod sharing;
 mod stages;

@@ -2,6 +2,7 @@
 
 use crate::common::{Demo, Run, lesson, noise};
 use crate::imported_memory::ImportedMemory;
+use crate::room::raft;
 use crate::{assert_alive, gpu, options, run};
 use sim_engine::backend::sharing::SharedCommand;
 use sim_engine::backend::{Input, Values};
@@ -156,6 +157,47 @@ fn commands_that_wait_are_kept_when_their_memory_goes() {
     there.step();
     assert!(here.sim.snapshot() == there.sim.snapshot());
     assert_alive(&here);
+}
+
+#[test]
+fn slots_and_commands_outlast_more_room_for_contacts() {
+    let model = raft();
+    for discrete in [false, true] {
+        open_as_discrete(discrete);
+        let fields = [Field::JointQ, Field::ContactCount, Field::ContactForce];
+        let [mut here, mut there] = [(); 2].map(|()| run(&model, gpu(), 5, &fields));
+        open_as_discrete(false);
+        let mut peer = Peer::new(&mut here.sim, 1);
+        let words = here.arena.len();
+        let start: Vec<f64> = (0..5)
+            .flat_map(|world| [0.0, 0.0, 0.0205 + 0.002 * f64::from(world)])
+            .collect();
+        let values = Values::F64(&start);
+        for run in [&mut here, &mut there] {
+            run.sim.write(Field::JointQ, 0..3, values, None).unwrap();
+        }
+        for frame in 0..6 {
+            let mut forces = vec![0.0; 5 * 7];
+            forces
+                .iter_mut()
+                .skip(6)
+                .step_by(7)
+                .for_each(|force| *force = frame as f32);
+            let host = Values::F32(&forces);
+            there.sim.command(Field::JointF, 0..7, host).unwrap();
+            let left = peer.leave(Field::JointF, &forces);
+            let sharing = here.sim.sharing().unwrap();
+            assert!(sharing.accepts(&[left], 1).unwrap());
+            sharing.stage_shared(&[left]);
+            sharing.assign_slot(&here.arena);
+            here.step();
+            there.step();
+            assert!(here.arena == there.arena, "frame {frame}");
+            assert!(peer.frame(0, words) == here.arena, "frame {frame}");
+        }
+        assert_eq!(here.get(Field::ContactCount, 0), [36.0]);
+        assert_alive(&here);
+    }
 }
 
 /// A cube alone, which has no drives.

@@ -170,14 +170,16 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src/backend/gpu",
         &[
-            "words", "mirror", "kernels", "software", "compiled", "uploads", "sizing", "tile",
-            "imported", "shared", "backend", "sharing", "worlds", "frame", "create",
+            "words", "mirror", "kernels", "software", "recipe", "compiled", "uploads", "sizing",
+            "lacks", "tile", "imported", "shared", "backend", "sharing", "worlds", "growth",
+            "frame", "create",
         ],
     ),
     (
         "sim-core/engine/src/backend/gpu/kernels",
         &[
             "workgroups",
+            "room",
             "merged",
             "blocks",
             "places",

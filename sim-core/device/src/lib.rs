@@ -66,6 +66,8 @@ pub use batch::{Batch, BatchBuilder, Replay};
 pub use device::Device;
 pub use error::DeviceError;
 pub use host_pages::HostPages;
+#[doc(hidden)]
+pub use memory::allocate_at_most;
 pub use memory::shared::{Descriptor, Moment, SharedBuffer, Timeline};
 pub use memory::{Buffer, Read, Staging, Write};
 pub use program::Program;

@@ -18,7 +18,7 @@ pub use sim_device::{
     AdapterInfo, AdapterKind, Choice as Adapter, Replay, adapters, leave, leave_at_once,
 };
 #[doc(hidden)]
-pub use sim_device::{compiling, lose_after, open_as_discrete};
+pub use sim_device::{allocate_at_most, compiling, lose_after, open_as_discrete};
 
 /// The device that keeps the worlds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -187,6 +187,10 @@ impl Simulation {
     pub fn programs(&self) -> &[ProgramInfo] {
         self.backend.programs()
     }
+    /// Contacts of a class that a world of a GPU has room for now; none where all have room from the start, as on the CPU.
+    pub fn contact_room(&self) -> Option<usize> {
+        self.backend.contact_room()
+    }
     /// What each command of the last frame took on a GPU, of its first tile [s]: the name of a program, or `copy`. Empty unless
     /// `Options::replay` is `Replay::Timed`, and on the CPU.
     pub fn seconds(&self) -> Vec<(&str, f64)> {

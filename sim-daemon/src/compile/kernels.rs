@@ -20,11 +20,19 @@ pub(super) fn text(listing: &Listing, lists: bool) -> String {
             kernel.label, kernel.dispatches, kernel.threads, kernel.statements, kernel.bytes
         );
     }
-    let [fields, contacts] =
-        [listing.fields_bytes, listing.contacts_bytes].map(|bytes| bytes.div_ceil(1000));
+    let [fields, contacts, most] = [
+        listing.fields_bytes,
+        listing.contacts_bytes,
+        listing.contacts_bytes_max,
+    ]
+    .map(|bytes| bytes.div_ceil(1000));
+    let more = match contacts == most {
+        true => String::new(),
+        false => format!(", {most} kB once a world needs room for all"),
+    };
     let _ = writeln!(
         text,
-        "memory of a world: {fields} kB, and {contacts} kB for contacts"
+        "memory of a world: {fields} kB, and {contacts} kB for contacts{more}"
     );
     if lists {
         for kernel in &listing.kernels {

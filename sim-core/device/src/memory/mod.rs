@@ -9,6 +9,7 @@ use crate::device::{Device, Inner};
 use crate::error::DeviceError;
 use crate::host_pages::Pinned;
 use crate::vulkan;
+use std::cell::Cell;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -153,6 +154,17 @@ impl DerefMut for Write<'_> {
     }
 }
 
+thread_local! {
+    /// Buffers that this thread may allocate.
+    static ALLOCATIONS_LEFT: Cell<u64> = const { Cell::new(u64::MAX) };
+}
+
+/// Lets this thread run out of memory after so many buffers. For tests of the error path.
+#[doc(hidden)]
+pub fn allocate_at_most(buffers: u64) {
+    ALLOCATIONS_LEFT.set(buffers);
+}
+
 impl Device {
     /// Memory of the device, zeroed.
     pub fn buffer(&self, label: &str, bytes: u64) -> Result<Buffer, DeviceError> {
@@ -166,12 +178,14 @@ impl Device {
 
     fn make(&self, label: &str, bytes: u64, place: Residence) -> Result<Buffer, DeviceError> {
         self.inner.alive()?;
+        let left = ALLOCATIONS_LEFT.get();
+        ALLOCATIONS_LEFT.set(left.saturating_sub(u64::from(left < u64::MAX)));
         let no_room = || DeviceError::OutOfMemory {
             label: label.to_owned(),
             bytes,
         };
         let limit = self.inner.buffer_max.min(isize::MAX as u64) - GRAIN;
-        if bytes > limit.min(self.info().memory.unwrap_or(u64::MAX)) {
+        if left == 0 || bytes > limit.min(self.info().memory.unwrap_or(u64::MAX)) {
             return Err(no_room());
         }
         let rounded = bytes.max(1).next_multiple_of(GRAIN);

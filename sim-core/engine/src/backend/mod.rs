@@ -155,6 +155,10 @@ pub type Backends = Vec<Box<dyn Backend>>;
 pub trait Backend: Send {
     /// Name of the processor or GPU, for people.
     fn device(&self) -> &str;
+    /// Contacts of a class that a world has room for now, of a model in which that can grow.
+    fn contact_room(&self) -> Option<usize> {
+        None
+    }
     /// The programs of a GPU; none on the CPU.
     fn programs(&self) -> &[ProgramInfo] {
         &[]

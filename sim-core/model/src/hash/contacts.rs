@@ -40,6 +40,7 @@ view! {
         Later { "mujoco_capsule_boxes": two_point_capsule_boxes }
         Never { "ordered_corners": ordered_corners }
         Never { "reference": reference }
+        Never { "room_grows": room_grows }
         => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
     Handles as "Handles":
         Always {

@@ -56,6 +56,8 @@ recast! {
         pub fields: FieldTables,
         /// Where the stages keep what they find.
         pub memory: Memory,
+        /// Do programs read first rows and capacities of classes when they run? Then worlds can get more room, up to that of `classes`.
+        pub room_grows: bool,
         /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
         pub turning: Fixed,
         /// How friction differs between the tangents of each pair ([`skew`]); without rows where it differs in none.
@@ -601,10 +603,7 @@ impl<R: Real> Contacts<R> {
             contacts_max: 0,
             rows_max: 0,
             may_overflow: false,
-            tables: Tables {
-                numbers: Vec::new(),
-                indices: Vec::new(),
-            },
+            tables: Tables::default(),
             handles: Handles::default(),
             hulls: HullTables::default(),
             fields: FieldTables::default(),
@@ -624,6 +623,7 @@ impl<R: Real> Contacts<R> {
                 field_prisms: table,
                 len: 0,
             },
+            room_grows: false,
             turning: Fixed::default(),
             skew: Fixed::default(),
             surface_velocities: Fixed::default(),

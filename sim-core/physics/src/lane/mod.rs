@@ -455,7 +455,8 @@ pub trait Cx: Sized {
     /// An empty list of at most `capacity` rows; rows that do not fit are counted, not stored.
     fn list(&mut self, capacity: usize) -> Self::List;
     /// A list that outlasts the stage: its rows are `first..first + capacity` of its tables, and its length is scalar 0 of row
-    /// `at` of `counts`, read whenever the list is used.
+    /// `at` of `counts`, read whenever the list is used. Where `first` and `capacity` are entries of a row of a fixed table, the
+    /// rows of lists with later entries lie behind.
     fn kept(&mut self, counts: Table, at: Self::I, first: Self::I, capacity: Self::I)
     -> Self::List;
     /// Opens a block for the worlds in `mask`, with a fresh row; see [`push!`].

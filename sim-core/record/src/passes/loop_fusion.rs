@@ -12,6 +12,7 @@
 
 use crate::ir::tree::{Binary, Bounds, Op, Operand, Row, Statement};
 use crate::ir::uses::Rename;
+use sim_physics::lane::Fixed;
 use std::collections::HashMap;
 
 /// Fuses the loops of a recording. New values are appended; `names` counts the names of loops.
@@ -28,11 +29,39 @@ struct Fuser<'a> {
 /// A loop over rows of which so many are in use.
 struct Span {
     index: u32,
-    first: usize,
+    first: Row,
     rows: Operand,
     /// Most rows that may be in use.
-    capacity: usize,
+    capacity: Capacity,
     body: Vec<Statement>,
+}
+
+/// Rows that a loop has room for.
+#[derive(Clone, Copy)]
+enum Capacity {
+    Fixed(usize),
+    /// What a table has, in the entry of the loop's first row.
+    Read,
+}
+
+/// An entry of a table of rooms.
+#[derive(Clone, Copy)]
+struct RoomEntry {
+    table: Fixed,
+    row: usize,
+    number: usize,
+}
+
+impl RoomEntry {
+    /// Are both of the same room?
+    fn is_beside(self, other: RoomEntry) -> bool {
+        (self.table, self.row) == (other.table, other.row)
+    }
+
+    /// Is this the same number of a room before the other?
+    fn is_before(self, other: RoomEntry) -> bool {
+        self.table == other.table && self.number == other.number && self.row < other.row
+    }
 }
 
 /// Loops that may be joined, and what stands between them.
@@ -81,7 +110,7 @@ impl Fuser<'_> {
             index,
             bounds:
                 Bounds::Span {
-                    first: Row::At(first),
+                    first,
                     end: Row::Value(end),
                 },
             body,
@@ -89,7 +118,7 @@ impl Fuser<'_> {
         else {
             return None;
         };
-        let Op::After(Row::At(from), rows) = self.values[*end as usize] else {
+        let Op::After(from, rows) = self.values[*end as usize] else {
             return None;
         };
         let Operand::Value(number) = rows else {
@@ -98,20 +127,71 @@ impl Fuser<'_> {
         let Op::Binary(Binary::Min, a, b) = self.values[number as usize] else {
             return None;
         };
-        let capacity = a.constant().or(b.constant())?;
+        let capacity = match (*first, a.constant().or(b.constant())) {
+            (Row::At(_), Some(capacity)) => Capacity::Fixed(capacity as usize),
+            (Row::Value(first), None) => {
+                let room = self.room(first)?;
+                let is_of_room = |x| self.read_number(x).is_some_and(|y| room.is_beside(y));
+                (is_of_room(a) || is_of_room(b)).then_some(Capacity::Read)?
+            }
+            _ => return None,
+        };
         (from == *first && is_plain(body)).then(|| Span {
             index: *index,
             first: *first,
             rows,
-            capacity: capacity as usize,
+            capacity,
             body: body.clone(),
         })
     }
 
+    /// The entry of a table that an index is read from.
+    fn room(&self, index: u32) -> Option<RoomEntry> {
+        match self.values[index as usize] {
+            Op::Index { entry, .. } => match entry.row {
+                Row::At(row) => Some(RoomEntry {
+                    table: entry.table,
+                    row,
+                    number: entry.number,
+                }),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The entry that a scalar is read from as an index.
+    fn read_number(&self, x: Operand) -> Option<RoomEntry> {
+        let Operand::Value(number) = x else {
+            return None;
+        };
+        match self.values[number as usize] {
+            Op::Number(Row::Value(index)) => self.room(index),
+            _ => None,
+        }
+    }
+
     /// Is the body of the loop that of those before it, and do its rows come behind theirs?
     fn fit(&self, last: &Span, next: &Span, run: &Run) -> bool {
-        let before: usize = run.spans.iter().map(|(span, _)| span.capacity).sum();
-        next.first >= before && self.renamed(last, 0) == self.renamed(next, 0)
+        self.comes_behind(last, next, run) && self.renamed(last, 0) == self.renamed(next, 0)
+    }
+
+    fn comes_behind(&self, last: &Span, next: &Span, run: &Run) -> bool {
+        match (last.first, next.first) {
+            (Row::At(_), Row::At(first)) => {
+                let before = run.spans.iter().map(|(span, _)| match span.capacity {
+                    Capacity::Fixed(rows) => rows,
+                    Capacity::Read => unreachable!("its first row is read, too"),
+                });
+                first >= before.sum::<usize>()
+            }
+            // the rooms of a table follow each other ([`sim_physics::lane::Cx::kept`])
+            (Row::Value(last), Row::Value(next)) => {
+                let rooms = self.room(last).zip(self.room(next));
+                rooms.is_some_and(|(last, next)| last.is_before(next))
+            }
+            _ => false,
+        }
     }
 
     /// The body with an index that is value `row`, and its operations, which are numbered after it.
@@ -177,7 +257,10 @@ impl Fuser<'_> {
         // rows of the spans before each one, and the offset from the index of the loop to the row
         let (mut ends, mut shifts): (Vec<Operand>, Vec<Operand>) = (Vec::new(), Vec::new());
         for span in spans {
-            let first = Operand::number(span.first as f32);
+            let first = match span.first {
+                Row::At(row) => Operand::number(row as f32),
+                row => self.compute(Op::Number(row), done),
+            };
             let (end, shift) = match ends.last() {
                 None => (span.rows, first),
                 Some(before) => {

@@ -99,6 +99,10 @@ pub(super) fn is_computed_again(op: &Op, values: &[Op]) -> bool {
             is_given(*a) && is_given(*b) && inputs == 1
         }
         Op::Constant(entry) | Op::Index { entry, .. } => matches!(entry.row, Row::At(_)),
+        Op::Number(Row::Value(index)) => match &values[*index as usize] {
+            index @ Op::Index { .. } => is_computed_again(index, values),
+            _ => false,
+        },
         _ => is_of_lane(op, values),
     }
 }

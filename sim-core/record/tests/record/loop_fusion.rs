@@ -1,7 +1,7 @@
 //! Loops that become one, and variables that stay with a kernel: the same bits.
 
 use crate::{accepted, c, toy};
-use sim_physics::lane::{Cx, Num, Table, Tables};
+use sim_physics::lane::{Cx, Fixed, Num, Table, Tables};
 use sim_physics::{each, times, when};
 use sim_record::split::{Limits, Prices, split};
 use sim_record::wgsl::{ProgramOptions, wgsl};
@@ -19,18 +19,29 @@ const COUNTS: Table = Table {
     rows: 3,
 };
 const NUMBERS: usize = 23;
+/// First row and room of each list.
+const ROOMS: Fixed = Fixed {
+    base: 1,
+    stride: 2,
+    rows: 3,
+};
 
-fn list(cx: &mut Recorder, k: usize) -> <Recorder as Cx>::List {
-    let (at, first, capacity) = (cx.at(k), cx.at(3 * k), cx.at(3));
+/// A list with three rows, or with those of its room.
+fn list(cx: &mut Recorder, k: usize, is_read: bool) -> <Recorder as Cx>::List {
+    let at = cx.at(k);
+    let (first, capacity) = match is_read {
+        true => (cx.index(ROOMS, at, 0, 7), cx.index(ROOMS, at, 1, 4)),
+        false => (cx.at(3 * k), cx.at(3)),
+    };
     cx.kept(COUNTS, at, first, capacity)
 }
 
 /// Goes over three lists; `constant` is what the body of each list adds.
-fn over_lists(constant: impl Fn(usize) -> f64) -> Recording {
+fn over_lists(is_read: bool, constant: impl Fn(usize) -> f64) -> Recording {
     accepted(|cx, x| {
         let mut sum = cx.var(x[0]);
         for k in 0..3 {
-            let rows = list(cx, k);
+            let rows = list(cx, k, is_read);
             each!(cx, r in rows, {
                 let (a, b) = (cx.load(ROWS, r, 0), cx.load(ROWS, r, 1));
                 cx.fill(ROWS, r, 1, a * b + x[1]);
@@ -49,10 +60,15 @@ fn loops(recording: &Recording) -> usize {
     text.matches("for (").count()
 }
 
-#[test]
-fn loops_of_one_body_over_several_lists_are_one_loop() {
-    let (joined, apart) = (over_lists(|_| 0.5), over_lists(|k| 0.5 + k as f64));
+fn check_joined(is_read: bool, rooms: [[u32; 2]; 3]) {
+    let joined = over_lists(is_read, |_| 0.5);
+    let apart = over_lists(is_read, |k| 0.5 + k as f64);
     assert_eq!((loops(&joined), loops(&apart)), (1, 3));
+    let indices: Vec<u32> = [9].into_iter().chain(rooms.into_iter().flatten()).collect();
+    let tables = Tables {
+        numbers: Vec::new(),
+        indices,
+    };
     let memory = |counts: [f32; 3]| -> Vec<f32> {
         let mut numbers: Vec<f32> = (0..NUMBERS).map(|i| 0.3 + i as f32).collect();
         numbers[COUNTS.base..].copy_from_slice(&counts);
@@ -68,18 +84,29 @@ fn loops_of_one_body_over_several_lists_are_one_loop() {
         // by hand, in the order of the code
         let mut expected = memory(counts);
         let mut sum = 0.7f32;
-        for (k, count) in counts.into_iter().enumerate() {
-            for r in 3 * k..3 * k + count.min(3.0) as usize {
+        for ([first, room], count) in rooms.into_iter().zip(counts) {
+            for r in first as usize..first as usize + count.min(room as f32) as usize {
                 let (a, b) = (expected[2 * r], expected[2 * r + 1]);
                 expected[2 * r + 1] = a * b + 0.2;
                 sum = (sum * 1.1 + a).sqrt() + 0.5;
             }
         }
         let mut got = memory(counts);
-        let result = joined.evaluate(&[0.7, 0.2], &mut got, &Tables::default());
+        let result = joined.evaluate(&[0.7, 0.2], &mut got, &tables);
         assert_eq!(result[0].to_bits(), sum.to_bits(), "{counts:?}");
         assert_eq!(got, expected, "{counts:?}");
     }
+}
+
+#[test]
+fn loops_of_one_body_over_several_lists_are_one_loop() {
+    check_joined(false, [[0, 3], [3, 3], [6, 3]]);
+}
+
+#[test]
+fn loops_over_rooms_that_are_read_are_one_loop_too() {
+    check_joined(true, [[0, 3], [3, 3], [6, 3]]);
+    check_joined(true, [[0, 1], [1, 0], [1, 2]]);
 }
 
 /// Rounds in which a variable is set and read under one mask, and added to in between.
@@ -87,7 +114,7 @@ fn masked(reads_always: bool) -> Recording {
     let text = |cx: &mut Recorder, x: &[Recorded]| {
         let mut variable = cx.var(x[0]);
         let mut sum = cx.var(x[1]);
-        let rows = list(cx, 0);
+        let rows = list(cx, 0, false);
         times!(cx, round in 4, {
             let at = cx.number(round);
             let mask = at.lt(x[2]);

@@ -4,6 +4,7 @@ use super::compiled::Compiled;
 use super::imported::Imported;
 use super::kernels::places::Places;
 use super::mirror::HostMirror;
+use super::recipe::{Extent, Recipe};
 use super::shared::Shared;
 use super::tile::Tile;
 use super::uploads::{Bounds, Rows};
@@ -28,6 +29,8 @@ pub(super) struct Gpu {
     pub tiles: Vec<Tile>,
     pub bounds: Bounds,
     pub compiled: Compiled,
+    pub recipe: Recipe,
+    pub extent: Extent,
     /// The frame in host memory.
     pub frame: Staging,
     /// The frame in device memory, where it is not written to host memory at once.
@@ -97,6 +100,11 @@ impl Backend for Gpu {
 
     fn seconds(&self) -> Vec<(&str, f64)> {
         self.tiles.first().map_or_else(Vec::new, Tile::seconds)
+    }
+
+    fn contact_room(&self) -> Option<usize> {
+        let grows = self.constants.contacts.room_grows;
+        grows.then(|| self.extent.room.most())
     }
 
     fn set_faults(&mut self, faults: Faults) {
@@ -213,6 +221,8 @@ impl Backend for Gpu {
         self.mirror
             .fill_params(&self.start[shape.start(Array::Params)..]);
         self.reset(None, Some(&[0]));
+        let may_grow = self.extent.room.can_grow(&self.constants);
+        self.bounds.set_may_grow(may_grow);
         self.mirror.frames = 0;
         self.mirror.frozen = Frozen::default();
         self.copied = 0;

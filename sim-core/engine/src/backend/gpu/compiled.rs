@@ -2,24 +2,18 @@
 
 use super::kernels::bookkeeping;
 use super::kernels::places::Places;
-use super::kernels::programs::{KernelSequence, Programs};
+use super::kernels::programs::KernelSequence;
+use super::kernels::room::Room;
 use super::kernels::workgroups::{self, BOOKKEEPING};
+use super::recipe::{Extent, Recipe};
 use super::software::{self, Compaction};
 use crate::backend::{BackendError, ProgramInfo};
 use sim_device::{Buffer, Device, DeviceError, Program, Replay, Source};
 use sim_physics::constants::Constants;
 use sim_record::split::Part;
-use std::time::Duration;
-
-/// Kernel sources that depend on the output fields.
-pub(super) struct OutputSources {
-    pub show: String,
-    pub contacts: Option<String>,
-    /// Whether the evaluation finds contacts.
-    pub finds_contacts: bool,
-}
 
 /// A kernel of physics.
+#[derive(Clone)]
 pub(super) struct Kernel {
     pub program: Program,
     /// Threads per world.
@@ -35,12 +29,14 @@ impl Kernel {
 }
 
 /// Kernels of physics, and the order in which they are dispatched.
+#[derive(Clone)]
 pub(super) struct Kernels {
     pub kernels: Vec<Kernel>,
     pub order: Vec<Part>,
 }
 
 /// All programs of a run, and the tables of the model.
+#[derive(Clone)]
 pub(super) struct Compiled {
     /// All substeps of a frame.
     pub step: Kernels,
@@ -52,9 +48,14 @@ pub(super) struct Compiled {
     pub rows: Program,
     pub show: Program,
     pub contacts: Option<Program>,
+    /// Notes whether a world lacked room for contacts in the substeps; only where worlds can get more.
+    pub note_room: Option<Program>,
+    /// The same in the evaluation, where that finds contacts.
+    pub note_shown_room: Option<Program>,
     /// Lists of active worlds.
     pub compaction: Compaction,
     pub numbers: Buffer,
+    /// The indices of the model, with the room that its contacts have.
     pub indices: Buffer,
     /// Descriptions of all programs, for people.
     pub info: Vec<ProgramInfo>,
@@ -63,16 +64,15 @@ pub(super) struct Compiled {
 }
 
 impl Compiled {
-    /// Compiles all programs of a model, for tiles of `width` worlds.
+    /// Compiles all programs of a model.
     pub fn new(
         device: &Device,
         m: &Constants<f32>,
         places: &Places,
-        programs: &Programs,
-        outputs: OutputSources,
-        width: u32,
-        limit: Duration,
+        recipe: &Recipe,
+        extent: &Extent,
     ) -> Result<Compiled, BackendError> {
+        let (programs, outputs, width) = (&recipe.programs, &recipe.outputs, extent.width);
         let source_of = |label: &str, wgsl: String, workgroup: Option<u32>| {
             let worlds = ("worlds".to_owned(), f64::from(width));
             let workgroup = workgroup.map(|n| ("workgroup".to_owned(), f64::from(n)));
@@ -94,10 +94,10 @@ impl Compiled {
             kernels.collect::<Vec<_>>()
         };
         let mut sources: Vec<Source> = vec![
-            source("begin", bookkeeping::begin(places, true), BOOKKEEPING),
+            source("begin", bookkeeping::begin(places, m, true), BOOKKEEPING),
             source(
                 "begin evaluation",
-                bookkeeping::begin(places, false),
+                bookkeeping::begin(places, m, false),
                 BOOKKEEPING,
             ),
             source(
@@ -106,19 +106,22 @@ impl Compiled {
                 BOOKKEEPING,
             ),
             source("rows", bookkeeping::ROWS.to_owned(), BOOKKEEPING),
-            source("show", outputs.show, BOOKKEEPING),
+            source("show", outputs.show.clone(), BOOKKEEPING),
         ];
         let steps = sources.len()..sources.len() + programs.step.kernels.len();
         sources.extend(physics("step", &programs.step));
         sources.extend(physics("evaluate", &programs.evaluate));
         let loops = software::loops([&programs.step.order, &programs.evaluate.order]);
         sources.extend(software::sources(device, &loops, width));
-        let has_contacts = outputs.contacts.is_some();
-        sources.extend(
-            outputs
-                .contacts
-                .map(|wgsl| source("contacts", wgsl, BOOKKEEPING)),
-        );
+        let contacts = outputs.contacts.clone();
+        sources.extend(contacts.map(|wgsl| source("contacts", wgsl, BOOKKEEPING)));
+        let grows = m.contacts.room_grows;
+        let notes = [grows, grows && outputs.finds_contacts];
+        for (lacking, _) in notes.into_iter().enumerate().filter(|(_, notes)| *notes) {
+            let mut note = source("note room", bookkeeping::note_room(places, m), BOOKKEEPING);
+            note.constants.push(("lacking".to_owned(), lacking as f64));
+            sources.push(note);
+        }
         let info = (sources.iter().enumerate())
             .map(|(k, source)| ProgramInfo {
                 label: source.label.clone(),
@@ -127,7 +130,7 @@ impl Compiled {
                     .then(|| dispatches_of(k - steps.start, &programs.step.order)),
             })
             .collect();
-        let mut compiled = device.programs(&sources, limit)?.into_iter();
+        let mut compiled = device.programs(&sources, recipe.limit)?.into_iter();
         let mut next = || compiled.next().expect("a program for every source");
         let [begin, begin_evaluation, check_faults, rows, show] = std::array::from_fn(|_| next());
         let mut kernels = |program: &KernelSequence| Kernels {
@@ -142,7 +145,8 @@ impl Compiled {
         };
         let (step, evaluate) = (kernels(&programs.step), kernels(&programs.evaluate));
         let compaction = Compaction::new(loops, &mut next);
-        let contacts = has_contacts.then(&mut next);
+        let contacts = outputs.contacts.is_some().then(&mut next);
+        let [note_room, note_shown_room] = notes.map(|notes| notes.then(&mut next));
         let tables = &m.contacts.tables;
         let numbers: Vec<u32> = tables.numbers.iter().map(|x| x.to_bits()).collect();
         Ok(Compiled {
@@ -154,11 +158,27 @@ impl Compiled {
             rows,
             show,
             contacts,
+            note_room,
+            note_shown_room,
             compaction,
             numbers: constant(device, "numbers", &numbers)?,
-            indices: constant(device, "indices", &tables.indices)?,
+            indices: constant(device, "indices", &extent.room.indices(m))?,
             info,
-            replay: Replay::Recorded,
+            replay: recipe.replay,
+        })
+    }
+
+    /// The same programs, with this room for contacts.
+    pub fn with_room(
+        &self,
+        device: &Device,
+        m: &Constants<f32>,
+        room: &Room,
+    ) -> Result<Compiled, BackendError> {
+        let indices = constant(device, "indices", &room.indices(m))?;
+        Ok(Compiled {
+            indices,
+            ..self.clone()
         })
     }
 }

@@ -1,17 +1,20 @@
 //! Creates the backend of each group: records and compiles the programs, allocates the tiles, and starts the worlds.
 
 use super::backend::Gpu;
-use super::compiled::{Compiled, OutputSources};
+use super::compiled::Compiled;
+use super::growth::tiles;
 use super::kernels::blocks::with_blocks;
 use super::kernels::merged::merged;
 use super::kernels::places::Places;
 use super::kernels::programs::{How, Programs};
+use super::kernels::room::{Room, growing};
 use super::kernels::show;
 use super::kernels::workgroups;
 use super::mirror::HostMirror;
+use super::recipe::{Extent, OutputSources, Recipe};
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
-use super::tile::Tile;
+use super::tile::TileInputs;
 use super::uploads::{Bounds, has_own_memory};
 use crate::backend::noise::Noise;
 use crate::backend::state::{Shape, finds_contacts, start};
@@ -25,6 +28,7 @@ use sim_physics::constants::Constants;
 use sim_physics::schedule::evaluation_stages;
 use sim_physics::step::StageId;
 use sim_record::split::{Limits, Prices};
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -75,8 +79,8 @@ fn limits(info: &AdapterInfo, threads: usize, cuts: Cuts) -> Limits {
 /// The constants of a model, as kernels with so many threads per world have them.
 pub(super) fn constants(model: &Model, threads: usize) -> Constants<f32> {
     match threads {
-        1 => model.constants().cast(),
-        _ => with_blocks(merged(model.constants())).cast(),
+        1 => growing(Cow::Borrowed(model.constants())).cast(),
+        _ => growing(with_blocks(merged(model.constants()))).cast(),
     }
 }
 
@@ -120,6 +124,8 @@ struct Part {
     numbering: Numbering,
     /// Groups that are still to be created, this one included: there must be memory for all.
     coming: usize,
+    /// All groups.
+    groups: usize,
 }
 
 /// One backend per group on the chosen adapter, each with a device of its own, so that none waits for another's batch.
@@ -139,6 +145,7 @@ pub fn create(
                 worlds: groups.worlds,
                 numbering,
                 coming,
+                groups: groups.count,
             };
             Ok(Box::new(Gpu::new(model, part, layout, wanted)?))
         },
@@ -157,8 +164,8 @@ impl Gpu {
             worlds,
             numbering,
             coming,
+            groups,
         } = part;
-        let limit = asked.compile_limit;
         let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
         let asked_threads = asked.world_threads;
@@ -183,12 +190,24 @@ impl Gpu {
             finds_contacts,
         };
         let scatters = outputs.contacts.is_some();
-        let widest = sizing::widest(&device, m, &places, worlds, threads as u32);
-        let tiles = (worlds as u64).div_ceil(u64::from(widest));
-        let needed = tiles * sizing::memory(m, &places, widest) + 2 * layout.bytes as u64;
+        let room = Room::at_start(m);
+        let threads = threads as u32;
+        let width = sizing::widest(&device, m, &places, &room, worlds, threads);
+        let extent = Extent { room, width };
+        let count = (worlds as u64).div_ceil(u64::from(width));
+        let needed = count * sizing::memory(m, &places, &extent) + 2 * layout.bytes as u64;
         check_memory(&device, coming * worlds, coming as u64 * needed)?;
-        let mut compiled = Compiled::new(&device, m, &places, &programs, outputs, widest, limit)?;
-        compiled.replay = asked.replay;
+        let recipe = Recipe {
+            programs,
+            outputs,
+            runs: show::runs(m, &places, layout),
+            pairs: sizing::pairs(m, sensors),
+            threads,
+            limit: asked.compile_limit,
+            replay: asked.replay,
+            groups,
+        };
+        let compiled = Compiled::new(&device, m, &places, &recipe, &extent)?;
         let frame = device.staging("frame", layout.bytes.max(64) as u64)?;
         // whole lines cross the bus best as they are written; contacts are written here and there. Arenas begin at a multiple of
         // `ARENA_ALIGN`, where a program can write only if the adapter binds buffers there
@@ -196,33 +215,25 @@ impl Gpu {
         let is_apart = has_own_memory(&device) && (scatters || !is_bound);
         let drawn = is_apart.then(|| device.buffer("frame", layout.bytes.max(64) as u64));
         let drawn = drawn.transpose()?;
-        let bounds = Bounds::new(&device)?;
-        let pairs = sizing::pairs(m, sensors);
-        let runs = show::runs(m, &places, layout);
-        let target = drawn.as_ref().unwrap_or(&frame);
-        let mut tiles = Vec::new();
-        for first in (0..worlds).step_by(widest as usize) {
-            let part = first..(first + widest as usize).min(worlds);
-            let bounds = &bounds.buffer;
-            let tile = Tile::new(
-                &device, m, &places, &compiled, part, widest, &runs, &pairs, bounds,
-            )?;
-            tiles.push(tile);
-        }
-        for tile in &mut tiles {
-            tile.record(&device, &compiled, target)?;
-        }
-        if let Some(last) = tiles.last_mut()
-            && let Some(drawn) = &drawn
-        {
-            last.copy_out(&device, &compiled, drawn, &frame, layout.bytes as u64)?;
-        }
+        let mut bounds = Bounds::new(&device)?;
+        bounds.set_may_grow(extent.room.can_grow(m));
+        let inputs = TileInputs {
+            device: &device,
+            constants: m,
+            places: &places,
+            compiled: &compiled,
+            bounds: &bounds.buffer,
+        };
+        let target = (drawn.as_ref(), &*frame, layout.bytes as u64);
+        let tiles = tiles(inputs, &recipe, &extent, std::iter::once(0..worlds), target)?;
         let shape = Shape::from_constants(m);
         let mut gpu = Gpu {
             shared: None,
             tiles,
             bounds,
             compiled,
+            recipe,
+            extent,
             frame,
             drawn,
             imports: device.info().imports,
@@ -247,8 +258,7 @@ impl Gpu {
         let all: Vec<usize> = (0..worlds).collect();
         gpu.mirror
             .fill_params(&gpu.start[shape.start(Array::Params)..]);
-        let padding = gpu.start.clone();
-        gpu.pad(&padding)?;
+        gpu.pad(&gpu.tiles)?;
         gpu.begin(&all)?;
         Ok(gpu)
     }

@@ -1,6 +1,7 @@
 //! A control frame: commands are sent, the recorded batches run, and the mirror is updated from the counters.
 
 use super::backend::Gpu;
+use super::lacks::Again;
 use super::tile::Tile;
 use super::uploads::Rows;
 use super::words;
@@ -125,27 +126,21 @@ impl Gpu {
             self.send_command_noise()?;
         }
         let place = arena.as_ptr() as usize;
-        let imported = self.imported.iter().find(|(known, _)| *known == place);
-        let is_staged = imported.is_none();
-        let shared = self.shared.as_ref();
-        let slot = shared.and_then(|shared| shared.slot(place));
-        let shown = shared.zip(slot).map(|(shared, slot)| shared.shows(slot));
-        let shown = shown.or(imported.map(|(_, imported)| &imported.shown[..]));
-        let mut batches = Vec::with_capacity(3 * self.tiles.len());
-        batches.extend(self.bounds.pending());
-        batches.extend(shared.iter().flat_map(|shared| shared.commands.pending()));
-        for (k, tile) in self.tiles.iter().enumerate() {
-            batches.extend(tile.pending());
-            batches.push(tile.computes(steps));
-            batches.push(shown.map_or_else(|| tile.shows(), |shown| &shown[k]));
+        let first = match steps {
+            true => Again::Substeps,
+            false => Again::Evaluation,
+        };
+        self.run_parts(place, |_| first)?;
+        while let Some(mut parts) = self.lacking() {
+            self.make_room(&mut parts)?;
+            if let Some(shared) = &mut self.shared {
+                let slot = shared.slot(place);
+                shared.repeat(slot);
+            }
+            self.run_parts(place, |tile| parts[tile])?;
         }
-        if shown.is_none() {
-            batches.extend(self.tiles.iter().filter_map(Tile::copies_out));
-        }
-        let done = shared.and_then(|shared| shared.drawn(slot));
-        self.device.run_between(&batches, None, done)?;
-        self.bounds.sent();
-        self.commands_sent();
+        let slot = self.shared.as_ref().and_then(|shared| shared.slot(place));
+        let is_staged = !self.imported.iter().any(|(known, _)| *known == place);
         if is_staged {
             let bytes = self.layout.bytes;
             words::bytes(arena)[..bytes].copy_from_slice(&self.frame.read()[..bytes]);
@@ -168,6 +163,35 @@ impl Gpu {
                 self.begin(&again)?;
             }
         }
+        Ok(())
+    }
+
+    /// Runs these parts of the tiles' frames, and draws them for the arena at an address.
+    fn run_parts(
+        &mut self,
+        place: usize,
+        part: impl Fn(usize) -> Again,
+    ) -> Result<(), BackendError> {
+        let imported = self.imported.iter().find(|(known, _)| *known == place);
+        let shared = self.shared.as_ref();
+        let slot = shared.and_then(|shared| shared.slot(place));
+        let shown = shared.zip(slot).map(|(shared, slot)| shared.shows(slot));
+        let shown = shown.or(imported.map(|(_, imported)| &imported.shown[..]));
+        let mut batches = Vec::with_capacity(3 * self.tiles.len());
+        batches.extend(self.bounds.pending());
+        batches.extend(shared.iter().flat_map(|shared| shared.commands.pending()));
+        for (k, tile) in self.tiles.iter().enumerate() {
+            batches.extend(tile.pending());
+            batches.push(tile.computes(part(k)));
+            batches.push(shown.map_or_else(|| tile.shows(), |shown| &shown[k]));
+        }
+        if shown.is_none() {
+            batches.extend(self.tiles.iter().filter_map(Tile::copies_out));
+        }
+        let done = shared.and_then(|shared| shared.drawn(slot));
+        self.device.run_between(&batches, None, done)?;
+        self.bounds.sent();
+        self.commands_sent();
         Ok(())
     }
 

@@ -74,15 +74,26 @@ impl Imported {
         // SAFETY: batches write the arena alone, and run only while `Backend::run` borrows it.
         let pages = unsafe { device.import(owner, first_inside..end_inside)? };
         let before = (place - first) as u64;
+        let mut imported = Imported {
+            shown: Vec::new(),
+            pages,
+            before,
+        };
+        imported.record((device, compiled, tiles), drawn, bytes as u64)?;
+        Ok(imported)
+    }
+
+    /// Records what writes a frame of `bytes`, for these tiles.
+    pub fn record(
+        &mut self,
+        run: (&Device, &Compiled, &[Tile]),
+        drawn: Option<&Buffer>,
+        bytes: u64,
+    ) -> Result<(), BackendError> {
         let drawn = drawn.map_or(Drawn::InPlace, |buffer| {
             Drawn::Apart(buffer, 0..buffer.bytes())
         });
-        let target = Target(&pages, before);
-        let shown = record((device, compiled, tiles), drawn, target, bytes as u64)?;
-        Ok(Imported {
-            shown,
-            pages,
-            before,
-        })
+        self.shown = record(run, drawn, Target(&self.pages, self.before), bytes)?;
+        Ok(())
     }
 }

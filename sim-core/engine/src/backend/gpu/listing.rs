@@ -3,6 +3,7 @@
 use super::compiled::dispatches_of;
 use super::create::{HARDWARE, constants, programs};
 use super::kernels::programs::{How, KernelSequence, KernelSource};
+use super::kernels::room::Room;
 use super::kernels::workgroups;
 use crate::backend::BackendError;
 use sim_device::{Source, translated};
@@ -17,8 +18,10 @@ pub struct Listing {
     pub kernels: Vec<KernelListing>,
     /// Memory of a world: state, commands and what stages leave for each other [bytes].
     pub fields_bytes: usize,
-    /// Memory of a world: contacts [bytes].
+    /// Memory of a world: contacts, with the room that it has at the start [bytes].
     pub contacts_bytes: usize,
+    /// The same with room for all contacts that there may be [bytes].
+    pub contacts_bytes_max: usize,
 }
 
 /// A kernel of physics.
@@ -61,7 +64,8 @@ pub fn listing(
     Ok(Listing {
         kernels,
         fields_bytes: 4 * places.len as usize,
-        contacts_bytes: 4 * m.contacts.memory.len,
+        contacts_bytes: 4 * Room::at_start(m).numbers(m),
+        contacts_bytes_max: 4 * Room::at_most(m).numbers(m),
     })
 }
 

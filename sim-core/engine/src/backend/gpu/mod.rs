@@ -4,8 +4,11 @@
 //! The physics code is recorded for the model (`kernels::programs`). Where nothing touches, all substeps are one recording; otherwise one
 //! substep is, and it is dispatched once per substep. `sim_record::split` partitions a recording into kernels that a driver compiles in
 //! good time. It cuts where few values cross; values that cross go through spare fields. The evaluation of output fields is a second
-//! recording. A few more kernels do the bookkeeping (`kernels::bookkeeping`: rows, faults, delays) or write a frame (`kernels::show`). They are dispatched
-//! once a frame: one for each command that waits, two around the substeps, and one or, with fields of contacts, two for the frame.
+//! recording. A few more kernels, each dispatched once a frame, do the rest:
+//!
+//! - `kernels::bookkeeping`: one for each command that waits, two around the substeps (what was before, faults and delays), and one after
+//!   substeps and evaluation where worlds can get more room for contacts;
+//! - `kernels::show`: one for the frame, and one for fields of contacts.
 //!
 //! # Threads per world
 //! Where contacts can be, hardware has eight threads per world (`kernels::workgroups`). They share the rows of contacts, and each keeps columns of
@@ -17,7 +20,8 @@
 //! # Memory
 //! Programs read and write *fields* (`kernels::places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and
 //! commands come first, then what stages leave for each other. Contacts lie likewise in a buffer of their own. A *tile* is as many
-//! worlds as a binding can hold (`tile`).
+//! worlds as a binding can hold (`tile`). Contacts have room for few of each class at first (`kernels::room`). A frame in which a world
+//! needs more is undone, all tiles are made anew with twice the room, and the frame is repeated (`growth`).
 //!
 //! # A frame
 //! A frame of a tile is recorded once: waiting commands, substeps, fault checks, evaluation, then a batch that writes the output. Where
@@ -42,10 +46,13 @@ mod backend;
 mod compiled;
 mod create;
 mod frame;
+mod growth;
 mod imported;
 mod kernels;
+mod lacks;
 mod listing;
 mod mirror;
+mod recipe;
 mod shared;
 mod sharing;
 mod sizing;

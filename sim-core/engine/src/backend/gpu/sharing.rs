@@ -1,11 +1,12 @@
 //! What a client of another process asks of a GPU's memory.
 
 use super::backend::Gpu;
-use super::imported::Target;
+use super::imported::{Imported, Target};
 use super::shared::{Run, Shared};
 use crate::backend::BackendError;
 use crate::backend::clocks;
 use crate::backend::sharing::{SharedMemory, Sharing};
+use sim_device::Buffer;
 use sim_physics::arrays::{Field, Slot};
 use std::ops::Range;
 use std::time::Duration;
@@ -15,6 +16,16 @@ impl Gpu {
     fn is_finished_by_host(&self, slot: &Slot) -> bool {
         let has_clocks = slot.field == Field::Sensordata && clocks::are_in(&self.constants);
         slot.bytes > 0 && (self.noise.for_field(slot.field).is_some() || has_clocks)
+    }
+
+    /// Records what names the tiles in shared memory.
+    pub(super) fn record_shared(&mut self) -> Result<(), BackendError> {
+        let Some(shared) = &mut self.shared else {
+            return Ok(());
+        };
+        let (imported, frame) = (&self.imported, &self.frame);
+        let run = (&self.device, &self.compiled, &self.tiles[..]);
+        shared.record(run, |place| target(imported, frame, place))
     }
 
     /// Runs something of shared memory. An error loses the device.
@@ -29,6 +40,14 @@ impl Gpu {
         done.inspect_err(|error| {
             self.lost.get_or_init(|| error.clone());
         })
+    }
+}
+
+/// Where the frames of the arena at an address are copied to.
+fn target<'a>(imported: &'a [(usize, Imported)], frame: &'a Buffer, place: usize) -> Target<'a> {
+    match imported.iter().find(|(known, _)| *known == place) {
+        Some((_, imported)) => Target(&imported.pages, imported.before),
+        None => Target(frame, 0),
     }
 }
 
@@ -64,11 +83,7 @@ impl Sharing for Gpu {
         let Some(shared) = self.shared.as_mut().filter(|shared| shared.is_new(place)) else {
             return;
         };
-        let imported = self.imported.iter().find(|(known, _)| *known == place);
-        let target = match imported {
-            Some((_, imported)) => Target(&imported.pages, imported.before),
-            None => Target(&self.frame, 0),
-        };
+        let target = target(&self.imported, &self.frame, place);
         let run = (&self.device, &self.compiled, &self.tiles[..]);
         if let Err(error) = shared.assign(run, place, target) {
             self.lost.get_or_init(|| error);

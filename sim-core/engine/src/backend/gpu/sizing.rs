@@ -1,7 +1,9 @@
 //! Sizes: worlds of a tile, memory of a tile, and what an adapter cannot hold.
 
 use super::kernels::places::Places;
+use super::kernels::room::Room;
 use super::kernels::workgroups::{self, BOOKKEEPING};
+use super::recipe::Extent;
 use super::software;
 use super::uploads;
 use crate::backend::{BackendError, available_memory};
@@ -16,11 +18,12 @@ pub(super) fn widest(
     device: &Device,
     m: &Constants<f32>,
     places: &Places,
+    room: &Room,
     worlds: usize,
     threads: u32,
 ) -> u32 {
     let info = device.info();
-    let numbers = (places.len as u64).max(m.contacts.memory.len as u64).max(4);
+    let numbers = (places.len as u64).max(room.numbers(m) as u64).max(4);
     let fit = info.binding_max.min(u64::from(u32::MAX)) / (4 * numbers);
     // padding included, so that a dispatch has enough workgroups even where each is a single world
     let lanes = BOOKKEEPING.max(workgroups::physics(info));
@@ -38,16 +41,16 @@ pub(super) fn widest(
 }
 
 /// Memory of a tile, staging buffers included [bytes].
-pub(super) fn memory(m: &Constants<f32>, places: &Places, width: u32) -> u64 {
+pub(super) fn memory(m: &Constants<f32>, places: &Places, extent: &Extent) -> u64 {
     let state = u64::from(places.state);
     // fields, contacts and counters; state and counters for the host, rows from it with their worlds, commands
-    let numbers = u64::from(places.len) + m.contacts.memory.len as u64 + 4;
+    let numbers = u64::from(places.len) + extent.room.numbers(m) as u64 + 4;
     let host = (state + 4)
         + (state + 1)
         + uploads::commands(m)
             .map(|(_, columns)| columns as u64)
             .sum::<u64>();
-    4 * (numbers + host) * u64::from(width)
+    4 * (numbers + host) * u64::from(extent.width)
 }
 
 /// Shapes and links of each pair, then the flags of each sensor and shape, as `show::contacts` reads them.

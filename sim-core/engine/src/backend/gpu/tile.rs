@@ -9,15 +9,18 @@
 //! | buffer | numbers | largest index |
 //! |---|---|---|
 //! | fields | `Places::len` times `width` | a place, and a world below `width`: other threads leave at once |
-//! | contacts | `memory.len` of the model's contacts times `width` | a row below its list's capacity, which `push` and `kept` hold |
+//! | contacts | `Room::numbers` times `width` | a row below its list's capacity, which `push` and `kept` hold; `Compiled::indices` has the same room |
 //! | counters, lists of worlds | 4, 1 times `width` | a world below `width` |
+//! | lacks | 4 | 2 |
 //! | numbers, indices | those of the model's tables | a row that a table names, or that is clamped to the table before it is read |
 //! | frame, runs, pairs | the layout's, the runs', the pairs' | `check_frame` and `show` derive both from one layout |
 
 use super::compiled::{Compiled, Kernels, constant};
 use super::kernels::places::Places;
-use super::kernels::show::{Run, ShowTable};
+use super::kernels::show::ShowTable;
 use super::kernels::workgroups::{self, BOOKKEEPING};
+use super::lacks::{Again, Lacks};
+use super::recipe::{Extent, Recipe};
 use super::software::{self, ActiveWorlds};
 use super::uploads::{RowUpload, Rows, StagedCommand};
 use crate::backend::{BackendError, Input};
@@ -25,6 +28,16 @@ use sim_device::{Batch, BatchBuilder, Buffer, Device, Program, Replay, Staging};
 use sim_physics::constants::Constants;
 use sim_record::split::Part;
 use std::ops::Range;
+
+/// What all tiles of a run share.
+#[derive(Clone, Copy)]
+pub(super) struct TileInputs<'a> {
+    pub device: &'a Device,
+    pub constants: &'a Constants<f32>,
+    pub places: &'a Places,
+    pub compiled: &'a Compiled,
+    pub bounds: &'a Buffer,
+}
 
 /// Buffers and batches of some worlds. Field order matters: batches are dropped before what they name.
 pub(super) struct Tile {
@@ -46,6 +59,8 @@ pub(super) struct Tile {
     scratch: Buffer,
     counters: Buffer,
     bounds: Buffer,
+    /// Whether a world lacked room for contacts, where worlds can get more.
+    lacks: Option<Lacks>,
     runs: Buffer,
     /// Workgroups that show its worlds.
     show_groups: u32,
@@ -57,32 +72,37 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    #[expect(clippy::too_many_arguments)] // the parts of a tile
+    /// Allocates the buffers of some worlds, with the room for contacts that the programs have.
     pub fn new(
-        device: &Device,
-        m: &Constants<f32>,
-        places: &Places,
-        compiled: &Compiled,
+        inputs: TileInputs<'_>,
+        recipe: &Recipe,
+        extent: &Extent,
         worlds: Range<usize>,
-        width: u32,
-        runs: &[Run],
-        pairs: &[[i32; 4]],
-        bounds: &Buffer,
     ) -> Result<Tile, BackendError> {
+        let TileInputs {
+            device,
+            constants: m,
+            places,
+            compiled,
+            bounds,
+        } = inputs;
+        let width = extent.width;
         let lanes = u64::from(width);
         let bytes = |numbers: u64| 4 * numbers.max(4) * lanes;
         let fields = device.buffer("fields", bytes(u64::from(places.len)))?;
-        let scratch = device.buffer("contacts", bytes(m.contacts.memory.len as u64))?;
+        let scratch = device.buffer("contacts", bytes(extent.room.numbers(m) as u64))?;
         let counters = device.buffer("counters", bytes(4))?;
         let words = software::show_words(device.info());
-        let show = ShowTable::new(runs, &worlds, words, device.info().workgroups_max);
+        let show = ShowTable::new(&recipe.runs, &worlds, words, device.info().workgroups_max);
         let runs = constant(device, "runs", show.words.as_flattened())?;
-        let pairs: Vec<u32> = pairs
+        let pairs: Vec<u32> = (recipe.pairs)
             .as_flattened()
             .iter()
             .map(|x| x.cast_unsigned())
             .collect();
         let pairs = constant(device, "pairs", &pairs)?;
+        let grows = compiled.note_room.is_some();
+        let lacks = grows.then(|| Lacks::new(device, worlds.len()));
         let state = 4 * u64::from(places.state) * lanes;
         let state_copy = device.staging("state", state + 16 * lanes)?;
         let mut read_state = device.batch(Replay::Recorded);
@@ -107,6 +127,7 @@ impl Tile {
             scratch,
             counters,
             bounds: bounds.clone(),
+            lacks: lacks.transpose()?,
             runs,
             show_groups: show.groups,
             pairs,
@@ -131,6 +152,9 @@ impl Tile {
             compiled,
             None,
         );
+        if let Some(note_room) = &compiled.note_room {
+            self.bookkeep(&mut step, note_room);
+        }
         self.bookkeep(&mut step, &compiled.check_faults);
         self.evaluate(&mut step, compiled);
         self.step = Some(step.finish()?);
@@ -147,6 +171,12 @@ impl Tile {
     fn evaluate(&self, batch: &mut BatchBuilder, compiled: &Compiled) {
         let evaluate = &compiled.evaluate;
         self.physics(batch, evaluate, &evaluate.order, compiled, None);
+        if let Some(note_room) = &compiled.note_shown_room {
+            self.bookkeep(batch, note_room);
+        }
+        if let Some(lacks) = &self.lacks {
+            lacks.read(batch);
+        }
     }
 
     fn physics(
@@ -210,11 +240,13 @@ impl Tile {
     }
 
     fn bookkeep(&self, batch: &mut BatchBuilder, program: &Program) {
-        let buffers = [
+        let mut buffers = vec![
             (0, &self.fields, 0..self.fields.bytes()),
             (1, &self.counters, 0..self.counters.bytes()),
             (2, &self.bounds, 0..self.bounds.bytes()),
         ];
+        let lacks = self.lacks.iter();
+        buffers.extend(lacks.map(|lacks| (3, &lacks.buffer, 0..lacks.buffer.bytes())));
         batch.dispatch(program, &buffers, self.width.div_ceil(BOOKKEEPING));
     }
 
@@ -248,6 +280,7 @@ impl Tile {
                     (2, runs, whole(runs)),
                     (3, frame, part.clone()),
                     (4, pairs, whole(pairs)),
+                    (5, &compiled.indices, whole(&compiled.indices)),
                 ],
                 self.width.div_ceil(BOOKKEEPING),
             );
@@ -277,8 +310,11 @@ impl Tile {
     }
 
     /// The batch that steps and evaluates, or only evaluates.
-    pub fn computes(&self, steps: bool) -> &Batch {
-        let batch = if steps { &self.step } else { &self.forward };
+    pub fn computes(&self, part: Again) -> &Batch {
+        let batch = match part {
+            Again::Substeps => &self.step,
+            Again::Evaluation => &self.forward,
+        };
         batch.as_ref().expect("recorded at the start")
     }
 
@@ -290,6 +326,37 @@ impl Tile {
     /// The batch that copies the whole frame out of device memory.
     pub fn copies_out(&self) -> Option<&Batch> {
         self.copy_out.as_ref()
+    }
+
+    /// What of its last frame has to run again, since a world lacked room for contacts.
+    pub fn again(&self) -> Option<Again> {
+        self.lacks.as_ref().and_then(Lacks::again)
+    }
+
+    /// Gives its worlds the state, counters and commands that they have in other tiles, of at least its width.
+    pub fn take(&self, device: &Device, others: &[Tile]) -> Result<(), BackendError> {
+        let mut batch = device.batch(Replay::Encoded);
+        for other in others {
+            let first = self.worlds.start.max(other.worlds.start);
+            let end = self.worlds.end.min(other.worlds.end);
+            let lanes = end.saturating_sub(first) as u64;
+            if lanes == 0 {
+                continue;
+            }
+            let [from, to] = [other, self].map(|tile| (first - tile.worlds.start) as u64);
+            let buffers = [
+                (&other.fields, &self.fields),
+                (&other.counters, &self.counters),
+            ];
+            for (old, new) in buffers {
+                let [old_width, new_width] = [other, self].map(|tile| u64::from(tile.width));
+                for quad in 0..new.bytes() / (16 * new_width) {
+                    let (from, to) = (quad * old_width + from, quad * new_width + to);
+                    batch.copy(old, 16 * from, new, 16 * to, 16 * lanes);
+                }
+            }
+        }
+        Ok(device.run(&[&batch.finish()?])?)
     }
 
     /// Takes a command of all worlds, to be sent with the next frame; false if these columns are no whole command.

@@ -6,7 +6,6 @@
 //! On a card with its own memory, a program that reads host memory waits for the bus. There the words are copied first ([`Upload`]).
 
 use super::compiled::{Compiled, constant};
-#[cfg(doc)]
 use super::kernels::bookkeeping;
 use super::kernels::places::Places;
 use super::kernels::workgroups::BOOKKEEPING;
@@ -75,7 +74,7 @@ impl Upload {
     }
 }
 
-/// Bounds of the run in device memory. They go with the next frame after they change.
+/// Bounds of the run in device memory, and whether worlds can get more room for contacts. They go with the next frame after they change.
 pub(super) struct Bounds {
     // dropped before the buffers that it names
     batch: Batch,
@@ -102,10 +101,20 @@ impl Bounds {
 
     /// Sets the bounds, as bits.
     pub fn set(&mut self, bounds: [u32; 2]) {
-        let new: [u8; 8] = bytemuck::cast(bounds);
+        self.put(0, &bounds);
+    }
+
+    /// Can worlds get more room for contacts?
+    pub fn set_may_grow(&mut self, may: bool) {
+        self.put(bookkeeping::MAY_GROW, &[u32::from(may)]);
+    }
+
+    fn put(&mut self, first: usize, words: &[u32]) {
+        let new: &[u8] = bytemuck::cast_slice(words);
         let mut staged = self.staged.write();
-        self.is_waiting |= staged[..8] != new;
-        staged[..8].copy_from_slice(&new);
+        let old = &mut staged[4 * first..][..new.len()];
+        self.is_waiting |= *old != *new;
+        old.copy_from_slice(new);
     }
 
     /// What sends the bounds, if they changed.

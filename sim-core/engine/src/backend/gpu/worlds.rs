@@ -1,6 +1,7 @@
 //! Values of worlds between host and device: starts, records, and columns that are written.
 
 use super::backend::Gpu;
+use super::tile::Tile;
 use super::uploads::Rows;
 use super::words;
 use crate::backend::state::{Shape, array_of};
@@ -13,11 +14,11 @@ impl Gpu {
         Shape::from_constants(&self.constants)
     }
 
-    /// Sets every lane to the scene's start, padding included.
-    pub(super) fn pad(&mut self, start: &[f32]) -> Result<(), BackendError> {
+    /// Sets every lane of some tiles to the scene's start, padding included.
+    pub(super) fn pad(&self, tiles: &[Tile]) -> Result<(), BackendError> {
         let mut row = vec![0; self.places.state as usize];
-        place(&self.record, start, &mut row);
-        for tile in &self.tiles {
+        place(&self.record, &self.start, &mut row);
+        for tile in tiles {
             tile.fill(&self.device, &row)?;
         }
         Ok(())

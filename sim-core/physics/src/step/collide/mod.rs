@@ -360,6 +360,20 @@ fn boxes_overlap<F: Num>(
     gap.lt(F::c(0.0))
 }
 
+/// First row and capacity of a class, which has this part of the table of rows.
+#[inline(always)]
+pub(crate) fn read_room<C: Cx>(
+    cx: &mut C,
+    t: &Contacts<<C::F as Num>::Real>,
+    class: C::I,
+) -> [C::I; 2] {
+    // bounds for backends that check what they read
+    let [first_end, capacity_end] = t.row_ends();
+    let first = cx.index(t.handles.class_rows, class, 0, first_end);
+    let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
+    [first, capacity]
+}
+
 /// The list of a pair's contacts. Its rows count from the reference point of the pair's class.
 #[inline(always)]
 fn points_of<C: Cx>(
@@ -375,10 +389,7 @@ fn points_of<C: Cx>(
     let origin = cx.index(indices, p, pair::ORIGIN, origins.rows);
     let origin = load_vec3(cx, origins, origin, 0);
     let class = cx.index(indices, p, pair::CLASS, t.classes.len());
-    // the part of the table of rows that the class has
-    let [first_end, capacity_end] = t.row_ends();
-    let first = cx.index(t.handles.class_rows, class, 0, first_end);
-    let capacity = cx.index(t.handles.class_rows, class, 1, capacity_end);
+    let [first, capacity] = read_room(cx, t, class);
     let mu = t.varying.mu.then(|| friction(cx, t, p, surface::MU));
     Points {
         list: cx.kept(t.memory.counts, class, first, capacity),

@@ -27,7 +27,7 @@ use crate::each;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::spatial::Spatial;
 use crate::math::vec3::{Vec3, load_vec3};
-use crate::step::collide::contact_slack;
+use crate::step::collide::{contact_slack, read_room};
 use crate::step::{BlockOf, ConstantsOf, Stage};
 
 /// Constraint rows of contacts.
@@ -433,14 +433,28 @@ fn note_overflow<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, most: &mu
         left_out = cx.load(t.memory.counts, row, 0);
     }
     // and those that their class has none for, which are counted, but not kept
-    for (k, class) in t.classes.iter().enumerate() {
+    for k in 0..t.classes.len() {
         let row = cx.at(k);
-        let over = cx.load(t.memory.counts, row, 0) - C::F::c(class.capacity as f64);
+        let [_, capacity] = room(cx, t, k);
+        let over = cx.load(t.memory.counts, row, 0) - cx.number(capacity);
         left_out = left_out + over.max(C::F::c(0.0));
     }
     // the largest of all steps since it was cleared
     let left_out = cx.get(most).max(left_out);
     cx.set(most, left_out);
+}
+
+/// First row and capacity of a class.
+#[inline(always)]
+fn room<C: Cx>(cx: &mut C, t: &Contacts<<C::F as Num>::Real>, class: usize) -> [C::I; 2] {
+    // a program that is compiled once serves all rooms that worlds get
+    if t.room_grows {
+        let class = cx.at(class);
+        return read_room(cx, t, class);
+    }
+    // else both are part of the program
+    let class = &t.classes[class];
+    [cx.at(class.first), cx.at(class.capacity)]
 }
 
 /// The list of a class's contacts.
@@ -450,8 +464,8 @@ pub(crate) fn class_list<C: Cx>(
     t: &Contacts<<C::F as Num>::Real>,
     class: usize,
 ) -> C::List {
-    let (at, first) = (cx.at(class), cx.at(t.classes[class].first));
-    let capacity = cx.at(t.classes[class].capacity);
+    let [first, capacity] = room(cx, t, class);
+    let at = cx.at(class);
     cx.kept(t.memory.counts, at, first, capacity)
 }
 

@@ -1,4 +1,5 @@
-//! Kernels around the steps of a world: they save its state, detect faults, age commands, and write rows from the host.
+//! Kernels around the steps of a world: they save its state, note what it lacks, detect faults, age commands, and write rows from the
+//! host.
 //!
 //! They move bits and compare them as integers, since WGSL may assume that no float is infinite or NaN. The CPU does the same in
 //! `backend/cpu/faults.rs` and `delay.rs`.
@@ -8,6 +9,9 @@ use sim_physics::arrays::{Array, status};
 use sim_physics::constants::Constants;
 use std::fmt::Write;
 use std::ops::Range;
+
+/// The word of the bounds that is 1 while worlds can get more room for contacts.
+pub(in crate::backend::gpu) const MAY_GROW: usize = 2;
 
 /// Head of every kernel. The counters are `step` (low and high word), `status`, `contacts_left_out`.
 const HEAD: &str = "
@@ -33,9 +37,25 @@ fn clear(wgsl: &mut String, place: Range<u32>) {
     );
 }
 
+/// A binding for models whose worlds can get more room for contacts. Words 0 and 1 are 1 if a world had too little in the substeps, or in
+/// the evaluation. Word 2 is the number of worlds.
+const LACKS: &str =
+    "@group(0) @binding(3) var<storage, read_write> lacks: array<atomic<u32>, 4>;\n";
+
+/// The head of kernels for a model.
+fn head(m: &Constants<f32>) -> String {
+    match m.contacts.room_grows {
+        true => LACKS.to_owned() + HEAD,
+        false => HEAD.to_owned(),
+    }
+}
+
 /// Before the substeps of a frame (`saves`), or before an evaluation alone.
-pub(in crate::backend::gpu) fn begin(places: &Places, saves: bool) -> String {
-    let mut wgsl = HEAD.to_owned();
+pub(in crate::backend::gpu) fn begin(places: &Places, m: &Constants<f32>, saves: bool) -> String {
+    let mut wgsl = head(m);
+    if m.contacts.room_grows {
+        wgsl += "    if (w == 0u) { atomicStore(&lacks[0], 0u); atomicStore(&lacks[1], 0u); }\n";
+    }
     if saves {
         let (quads, before) = (places.moving / 4, places.before / 4);
         let _ = writeln!(
@@ -56,7 +76,12 @@ pub(in crate::backend::gpu) fn check_faults(
     m: &Constants<f32>,
     counts: bool,
 ) -> String {
-    let mut wgsl = HEAD.to_owned();
+    let mut wgsl = head(m);
+    if m.contacts.room_grows {
+        wgsl += "    if (atomicLoad(&lacks[0]) != 0u) {\n";
+        restore(&mut wgsl, places);
+        wgsl += "        return;\n    }\n";
+    }
     wgsl += "    var lost = false;\n    var outside = false;\n";
     for (slot, bound) in [(Array::JointQ, 0), (Array::JointQd, 1)] {
         let Range { start, end } = places.range(slot);
@@ -87,7 +112,12 @@ pub(in crate::backend::gpu) fn check_faults(
     let (not_finite, bounds, frozen) = (status::NOT_FINITE, status::OUT_OF_BOUNDS, status::FROZEN);
     let converged = status::NOT_CONVERGED;
     let unconverged = places.range(Array::Unconverged).start;
-    let (quads, before) = (places.moving / 4, places.before / 4);
+    let mut restored = String::new();
+    restore(&mut restored, places);
+    if m.contacts.room_grows {
+        // the evaluation notes what the state that is kept lacks
+        clear(&mut restored, places.range(Array::LeftOut));
+    }
     let count = match counts {
         true => count_left_out(places),
         false => String::new(),
@@ -101,8 +131,7 @@ pub(in crate::backend::gpu) fn check_faults(
     if (!stays && outside) {{ count.z = select({bounds}u, {not_finite}u, lost); }}
     if (!stays && lost) {{ count.z = {not_finite}u; }}
     if ((count.z & {frozen}u) != 0u) {{
-        for (var q = 0u; q < {quads}u; q++) {{ fields[q * worlds + w] = fields[({before}u + q) * worlds + w]; }}
-    }} else {{
+{restored}    }} else {{
         count.x = count.x + 1u;
         if (count.x == 0u) {{ count.y = count.y + 1u; }}
     }}
@@ -113,6 +142,31 @@ pub(in crate::backend::gpu) fn check_faults(
     clear(&mut wgsl, places.range(Array::CommandNoise));
     age(&mut wgsl, places, m);
     wgsl + "}\n"
+}
+
+/// Sets a world to its state before the frame.
+fn restore(wgsl: &mut String, places: &Places) {
+    let (quads, before) = (places.moving / 4, places.before / 4);
+    let _ = writeln!(
+        wgsl,
+        "        for (var q = 0u; q < {quads}u; q++) {{ fields[q * worlds + w] = fields[({before}u + q) * worlds + w]; }}"
+    );
+}
+
+/// After the substeps (`lacking` is 0) or the evaluation (1): notes whether a world had too little room for contacts, while it may get
+/// more. Padding is left out, and so are the substeps of frozen worlds, which are not kept.
+pub(in crate::backend::gpu) fn note_room(places: &Places, m: &Constants<f32>) -> String {
+    let (frozen, left_out) = (status::FROZEN, places.range(Array::LeftOut).start);
+    let mut wgsl = "override lacking: u32;\n".to_owned() + &head(m);
+    let _ = write!(
+        wgsl,
+        "    let had_less = w < atomicLoad(&lacks[2]) && bitcast<f32>(number({left_out}u, w)) > 0.0;
+    let counts = lacking == 1u || (counters[w].z & {frozen}u) == 0u;
+    if (bounds[{MAY_GROW}] != 0u && had_less && counts) {{ atomicStore(&lacks[lacking], 1u); }}
+}}
+"
+    );
+    wgsl
 }
 
 /// Makes the commands of this frame those of the frame before, in worlds that are not frozen.

@@ -5,6 +5,7 @@
 //! columns are the dofs of all. A contact's levers are 0 for dofs that do not move its bodies. Where a robot can touch itself in many
 //! places, as a humanoid can, one class would have mostly zeros: then some stay apart, as long as all their code is short.
 
+use super::room::{others, size};
 use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{
     Class, Column, Contacts, Memory, Pair, Run, pair, row, turning,
@@ -243,21 +244,8 @@ fn merge_bodies(t: &mut Contacts<f64>, parts: &[Vec<usize>], old_pairs: &[Pair])
 
 /// Gives the rows of contacts another room, and moves what lies behind them.
 fn replace_rows(memory: &mut Memory, rows: Table) {
-    let size = |table: Table| (table.stride * table.rows).next_multiple_of(4);
     let (old, new) = (size(memory.rows), size(rows));
-    let moved = [
-        &mut memory.poses,
-        &mut memory.origins,
-        &mut memory.counts,
-        &mut memory.mu,
-        &mut memory.cut.corners,
-        &mut memory.cut.candidates,
-        &mut memory.cut.edges,
-        &mut memory.field_candidates,
-        &mut memory.field_cells,
-        &mut memory.field_prisms,
-    ];
-    for table in moved {
+    for table in others(memory) {
         if table.base > rows.base {
             table.base = table.base + new - old;
         }

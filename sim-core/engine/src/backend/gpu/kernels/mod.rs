@@ -5,5 +5,6 @@ pub(super) mod bookkeeping;
 pub(super) mod merged;
 pub(super) mod places;
 pub(super) mod programs;
+pub(super) mod room;
 pub(super) mod show;
 pub(super) mod workgroups;

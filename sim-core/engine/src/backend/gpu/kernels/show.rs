@@ -268,6 +268,7 @@ override workgroup: u32 = 64u;
 @group(0) @binding(3) var<storage, read_write> frame: array<u32>;
 // of each pair: two shapes, two links; then of each sensor and shape: 1 where it is of the sensor, 2 where against
 @group(0) @binding(4) var<storage, read> pairs: array<vec4<i32>>;
+@group(0) @binding(5) var<storage, read> indices: array<u32>;
 fn kept(i: u32, w: u32) -> f32 {{ return scratch[(i / 4u) * worlds + w][i % 4u]; }}
 fn at(row: u32, k: u32, w: u32) -> f32 {{ return kept({base}u + row * {stride}u + k, w); }}
 fn three(row: u32, k: u32, w: u32) -> vec3<f32> {{ return vec3<f32>(at(row, k, w), at(row, k + 1u, w), at(row, k + 2u, w)); }}
@@ -300,19 +301,22 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
     }
     for (k, class) in m.contacts.classes.iter().enumerate() {
         let reference = places.range(Array::Reference).start + 3 * class.trees.1 as u32;
+        let table = m.contacts.handles.class_rows;
+        let [first, capacity] = match m.contacts.room_grows {
+            true => [0, 1].map(|i| format!("indices[{}]", table.base + k * table.stride + i)),
+            false => [class.first, class.capacity].map(|rows| format!("{rows}u")),
+        };
         let _ = write!(
             text,
-            "    let end{k} = min(u32(kept({}u, w)), {}u);
+            "    let end{k} = min(u32(kept({}u, w)), {capacity});
     for (var i = 0u; i < end{k}; i++) {{
-        let row = {}u + i;
+        let row = {first} + i;
         let pair = pairs[u32(at(row, {}u, w))];
         let normal = three(row, {normal}u, w);
         let force = at(row, {force}u, w) * normal + at(row, {force}u + 1u, w) * three(row, {tangents}u, w)
             + at(row, {force}u + 2u, w) * three(row, {tangents}u + 3u, w);
 ",
             counts.base + k * counts.stride,
-            class.capacity,
-            class.first,
             row::PAIR,
             normal = row::NORMAL,
             force = row::FORCE,

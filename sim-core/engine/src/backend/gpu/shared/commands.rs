@@ -85,11 +85,8 @@ impl SharedCommands {
         read.copy(&flag, 0, &flag_read, 0, 16);
         let worlds = tiles.last().map_or(0, |tile| tile.worlds.end);
         let all = places.iter().map(|place| -> Result<_, BackendError> {
-            let write = tiles.iter().map(|tile| {
-                tile.write_shared(device, compiled, place.input, (buffer, place.offset))
-            });
             Ok(OnDevice {
-                write: write.collect::<Result<_, _>>()?,
+                write: writes(device, compiled, tiles, (buffer, place))?,
                 check: check_batch(device, m, &check, (buffer, place, worlds), &flag)?,
                 place: *place,
             })
@@ -101,6 +98,20 @@ impl SharedCommands {
             flag_read,
             waiting: Vec::new(),
         })
+    }
+
+    /// Records what writes the commands to other tiles.
+    pub fn record(
+        &mut self,
+        device: &Device,
+        compiled: &Compiled,
+        tiles: &[Tile],
+        buffer: &Buffer,
+    ) -> Result<(), BackendError> {
+        for command in &mut self.all {
+            command.write = writes(device, compiled, tiles, (buffer, &command.place))?;
+        }
+        Ok(())
     }
 
     /// Their names.
@@ -159,6 +170,19 @@ impl SharedCommands {
         let values = values.read();
         Ok(bytemuck::cast_slice(&values).to_vec())
     }
+}
+
+/// What writes a command to each tile.
+fn writes(
+    device: &Device,
+    compiled: &Compiled,
+    tiles: &[Tile],
+    (buffer, place): (&Buffer, &SharedCommand),
+) -> Result<Vec<Batch>, BackendError> {
+    let tiles = tiles.iter();
+    let writes =
+        tiles.map(|tile| tile.write_shared(device, compiled, place.input, (buffer, place.offset)));
+    writes.collect()
 }
 
 fn check() -> Source {

@@ -45,6 +45,8 @@ pub(super) struct Shared {
 struct Slot {
     /// Address of the arena.
     place: usize,
+    /// Its bytes in the buffer.
+    part: Range<u64>,
     /// Draws a frame and copies it out: one batch per tile.
     shown: Vec<Batch>,
     /// Sends what the host adds.
@@ -123,7 +125,7 @@ impl Shared {
     ) -> Result<(), BackendError> {
         let first = self.stride * self.slots.len() as u64;
         let part = first..first + self.bytes;
-        let drawn = Drawn::Apart(&self.buffer, part);
+        let drawn = Drawn::Apart(&self.buffer, part.clone());
         let shown = record(run, drawn, target, self.bytes)?;
         let mut finished = run.0.batch(Replay::Recorded);
         for part in &self.finished_by_host {
@@ -138,10 +140,34 @@ impl Shared {
         }
         self.slots.push(Slot {
             place,
+            part,
             shown,
             finished: finished.finish()?,
         });
         Ok(())
+    }
+
+    /// Records what writes commands and draws slots, for other tiles. The frames of an arena are copied to what `target` gives.
+    pub fn record<'a>(
+        &mut self,
+        run: (&Device, &Compiled, &[Tile]),
+        target: impl Fn(usize) -> Target<'a>,
+    ) -> Result<(), BackendError> {
+        let (device, compiled, tiles) = run;
+        let buffer = &self.buffer;
+        self.commands.record(device, compiled, tiles, buffer)?;
+        for slot in &mut self.slots {
+            let drawn = Drawn::Apart(buffer, slot.part.clone());
+            slot.shown = record(run, drawn, target(slot.place), self.bytes)?;
+        }
+        Ok(())
+    }
+
+    /// The next frame is drawn again: its first drawing took a value of the timeline.
+    pub fn repeat(&mut self, slot: Option<usize>) {
+        if self.drawn(slot).is_some() {
+            self.frames += 1;
+        }
     }
 
     /// The slot of the arena at an address.

@@ -158,6 +158,7 @@ pub(in crate::backend::gpu) fn sources(device: &Device, loops: &[Loop], width: u
 type ListPrograms = (Loop, [Program; 2]);
 
 /// Programs that make the lists.
+#[derive(Clone)]
 pub(in crate::backend::gpu) struct Compaction {
     /// The program that clears, and those of the loops.
     programs: Option<(Program, Vec<ListPrograms>)>,
