@@ -313,6 +313,11 @@ impl Iteration<'_> {
                 self.free(b)?;
                 self.partial_of(c)
             }
+            // a column that does not depend on which lane runs the iteration
+            Op::LoadAt(cell, column) if self.is_of_iteration(column) => {
+                self.loads.push(cell);
+                None
+            }
             // lanes exchange values outside of shared loops, and each has its own
             Op::Lane | Op::FromLane(..) | Op::AcrossLanes(..) | Op::Alike(_) | Op::LoadAt(..) => {
                 return None;
@@ -331,6 +336,20 @@ impl Iteration<'_> {
             self.partial.insert(number, of);
         }
         Some(())
+    }
+
+    /// Is a value an index, or read from a table of the model? Neither names a lane. A value that was computed before the loop may differ
+    /// between lanes.
+    fn is_of_iteration(&self, x: Operand) -> bool {
+        match x {
+            Operand::Value(number) => {
+                matches!(
+                    self.values[number as usize],
+                    Op::Number(_) | Op::Constant(_)
+                )
+            }
+            _ => false,
+        }
     }
 
     fn partial_of(&self, x: Operand) -> Option<u32> {

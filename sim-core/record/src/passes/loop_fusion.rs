@@ -213,7 +213,7 @@ impl Fuser<'_> {
         };
         match &self.values[*number as usize] {
             Op::Get(_) | Op::Count(_) => false,
-            Op::Load(cell) => {
+            Op::Load(cell) | Op::LoadAt(cell, _) => {
                 let from = cell.table.base;
                 let end = from + cell.table.rows * cell.table.stride;
                 let mut meets = false;

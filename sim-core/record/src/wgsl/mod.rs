@@ -46,7 +46,7 @@ pub enum Exchange {
     /// Shuffles of a subgroup. Its size must be a multiple of the lanes.
     #[default]
     Subgroup,
-    /// Memory of a workgroup, which must be one world. For drivers without shuffles.
+    /// Memory of a workgroup, which must be one world: where a world has more threads than a subgroup, or a driver has no shuffles.
     Workgroup,
 }
 
@@ -304,6 +304,7 @@ impl Printer<'_> {
         let end = self.recording.body.len() + 1;
         self.inputs(&fields, end)?;
         if lanes > 1 {
+            self.barrier_before_stores()?;
             line!(self, "if (lane == 0u) {{")?;
             self.indent += 1;
         }
@@ -449,6 +450,7 @@ impl Printer<'_> {
         body: &[Statement],
     ) -> fmt::Result {
         let lanes = self.recording.lanes();
+        self.barrier_before_stores()?;
         line!(
             self,
             "for (var i{i} = {first} + lane; i{i} < {end}; i{i} += {lanes}u) {{"
@@ -479,12 +481,22 @@ impl Printer<'_> {
         if self.recording.lanes() == 1 || self.is_shared {
             return store(self);
         }
+        self.barrier_before_stores()?;
         line!(self, "if (lane == 0u) {{")?;
         self.indent += 1;
         store(self)?;
         self.indent -= 1;
         line!(self, "}}")?;
         self.barrier()
+    }
+
+    /// Lets all lanes read what one of them is about to change. Those of a subgroup are assumed to run the same statement at a time, where
+    /// all are active: compilers keep them together.
+    fn barrier_before_stores(&mut self) -> fmt::Result {
+        match self.exchange {
+            Exchange::Subgroup => Ok(()),
+            Exchange::Workgroup => self.barrier(),
+        }
     }
 
     /// Orders the accesses of the lanes of a world to memory.

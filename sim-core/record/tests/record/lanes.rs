@@ -2,7 +2,7 @@
 
 use crate::{accepted, c, toy};
 use sim_physics::lane::{Cx, Num, Table, Tables};
-use sim_physics::{break_if, each, push, when};
+use sim_physics::{break_if, each, push, span, when};
 use sim_record::split::{Limits, Prices, Split, split};
 use sim_record::wgsl::{Exchange, ProgramOptions};
 use sim_record::{Recorded, Recorder, Recording};
@@ -167,6 +167,38 @@ fn sums_of_products_and_differences_under_a_mask_are_shared() {
             evaluated(&parts, [3.0, -2.0], &mut scratch.clone()),
             expected
         );
+    }
+}
+
+#[test]
+fn rows_whose_column_an_index_names_are_shared() {
+    let code = |cx: &mut Recorder, list: &List, x: &[Recorded]| {
+        // what gives a kernel its lanes
+        let mut sum = cx.var(x[1]);
+        each!(cx, r in *list, {
+            let more = cx.get(&sum) + cx.load(TABLE, r, 0);
+            cx.set(&mut sum, more);
+        });
+        let (first, end, columns) = (cx.at(0), cx.at(ROWS), cx.at(3));
+        span!(cx, k in first, columns, {
+            let column = cx.number(k);
+            span!(cx, r in first, end, {
+                let entry = cx.load_at(TABLE, r, 0, column);
+                let sum = cx.load(TABLE, r, 3) * x[0] + entry;
+                cx.store(TABLE, r, 3, sum);
+            });
+        });
+        vec![cx.get(&sum)]
+    };
+    let (mut expected, alone) = (memory(0), kernels(&recorded(1, code), 100_000));
+    evaluated(&alone, [0.5, 0.0], &mut expected);
+    assert_ne!(expected, memory(0));
+    for lanes in LANES {
+        let parts = kernels(&recorded(lanes, code), 100_000);
+        assert_eq!(texts(&parts).matches(&format!("+= {lanes}u")).count(), 2);
+        let mut got = memory(0);
+        evaluated(&parts, [0.5, 0.0], &mut got);
+        assert_eq!(got, expected);
     }
 }
 

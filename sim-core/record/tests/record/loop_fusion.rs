@@ -109,6 +109,38 @@ fn loops_over_rooms_that_are_read_are_one_loop_too() {
     check_joined(true, [[0, 1], [1, 0], [1, 2]]);
 }
 
+#[test]
+fn what_is_read_between_loops_that_write_it_keeps_them_apart() {
+    let recording = |reads: usize| {
+        accepted(move |cx, x| {
+            let mut sum = cx.var(x[0]);
+            for k in 0..3 {
+                let rows = list(cx, k, false);
+                each!(cx, r in rows, {
+                    let a = cx.load(ROWS, r, 0);
+                    cx.fill(ROWS, r, 1, a + x[1]);
+                });
+                // a column that is found at run time, of a row that the first loop writes
+                if k < reads {
+                    let row = cx.at(2);
+                    let seen = cx.load_at(ROWS, row, 0, x[1]);
+                    let more = cx.get(&sum) + seen;
+                    cx.set(&mut sum, more);
+                }
+            }
+            vec![cx.get(&sum)]
+        })
+    };
+    assert_eq!(loops(&recording(0)), 1);
+    let read = recording(1);
+    assert_eq!(loops(&read), 2);
+    let mut memory: Vec<f32> = (0..NUMBERS).map(|i| 0.5 * i as f32).collect();
+    memory[COUNTS.base..].fill(3.0);
+    // row 2 has 2 in column 0, so the loop writes 3 into column 1
+    let got = read.evaluate(&[0.25, 1.0], &mut memory, &Tables::default());
+    assert_eq!(got, [3.25]);
+}
+
 /// Rounds in which a variable is set and read under one mask, and added to in between.
 fn masked(reads_always: bool) -> Recording {
     let text = |cx: &mut Recorder, x: &[Recorded]| {
