@@ -1,6 +1,7 @@
 //! Several threads per world: they find what one thread finds, and their number of worlds does not matter.
 //!
-//! The software driver has no shuffles, so a workgroup is a world here, and its threads exchange values through memory.
+//! The software driver has subgroups as wide as the processor's vectors, of eight threads mostly. Where a world has more, it is a
+//! workgroup, and its threads exchange values through memory.
 
 use crate::common::{Run, noise};
 use crate::{assert_alive, gpu, options};
@@ -87,7 +88,7 @@ fn worlds_of_several_threads_move_as_on_the_cpu() {
     let ids: Vec<usize> = (0..WORLDS).collect();
     for frames in [1, 40] {
         let cpu = played(Device::Cpu, None, &ids, frames);
-        for threads in [4, 8] {
+        for threads in [4, 8, 16] {
             let here = played(gpu(), Some(threads), &ids, frames);
             let mut worst = 0.0_f64;
             for world in 0..WORLDS {

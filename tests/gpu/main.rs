@@ -7,6 +7,7 @@ mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;
 mod delivery;
+mod heaps;
 #[path = "../common/imported_memory.rs"]
 mod imported_memory;
 mod lanes;

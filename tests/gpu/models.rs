@@ -2,12 +2,10 @@
 
 use crate::common::{Run, noise, repo};
 use crate::{assert_alive, gpu, options};
+use sim_engine::backend::Values;
 use sim_engine::backend::gpu::{KernelListing, listing};
-use sim_engine::backend::{BackendError, Values};
 use sim_engine::simulation::{Device, Options, Simulation};
-use sim_model::{
-    Body, Collision, Description, Model, MujocoOptions, Pose, Robot, Shape, UrdfOptions,
-};
+use sim_model::{Description, Model, MujocoOptions, Robot, UrdfOptions};
 use sim_physics::arrays::Field;
 use std::fmt::Write;
 use std::sync::Arc;
@@ -120,26 +118,6 @@ fn kernels_of_a_robot_that_touches_itself_are_short() {
         assert!(statements < STATEMENTS_MAX, "{label}: {statements}");
     }
     assert!(kernels.iter().any(|kernel| kernel.threads == 8));
-}
-
-#[test]
-fn a_model_whose_kernels_would_be_too_long_is_refused_at_once() {
-    // each may touch every other one, so one system has 180 dofs
-    let mut scene = Description::new(1.0 / 240.0, 2);
-    for k in 0..30 {
-        let mut cube = Body::new(&format!("cube{k}"), Pose::at([0.3 * k as f64, 0.0, 0.0]));
-        let half_extents = [0.05; 3];
-        let shape = Collision::new(None, Shape::Box { half_extents }, Pose::identity());
-        cube.shapes.push((shape, 500.0));
-        scene.add_body(cube).unwrap();
-    }
-    let model = scene.compile().unwrap();
-    let layout = Simulation::layout_of(&model, &Options::default());
-    let refused = listing(&model, &layout, None).unwrap_err();
-    assert!(matches!(refused, BackendError::Program { .. }));
-    let text = refused.to_string();
-    assert!(text.contains("join its 180 dofs to one system"), "{text}");
-    assert!(text.contains("use device = cpu"), "{text}");
 }
 
 #[test]

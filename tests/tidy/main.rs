@@ -199,8 +199,8 @@ fn unsafe_stands_where_it_may() {
     assert_eq!(with_unsafe, listed);
 }
 
-/// Code for several threads per world: it is recorded, but no CPU runs it, so it may take memory.
-const RECORDED_ALONE: [&str; 2] = ["solver/own_rows.rs", "solver/spread.rs"];
+/// Code for GPUs alone: it is recorded, but no CPU runs it, so it may take memory.
+const RECORDED_ALONE: [&str; 3] = ["solver/own_rows.rs", "solver/rolled.rs", "solver/spread.rs"];
 
 #[test]
 fn a_step_names_no_backend_returns_no_result_and_takes_no_memory() {

@@ -178,8 +178,9 @@ pub const ORDER: &[(&str, &[&str])] = &[
     (
         "sim-core/engine/src/backend/gpu/kernels",
         &[
-            "workgroups",
             "room",
+            "rolled",
+            "workgroups",
             "merged",
             "blocks",
             "places",

@@ -41,7 +41,7 @@ view! {
         Never { "ordered_corners": ordered_corners }
         Never { "reference": reference }
         Never { "room_grows": room_grows }
-        => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs;
+        => are_stiff, impedances, bodies, has_rules, varying, mixing, named_pairs, rolled;
     Handles as "Handles":
         Always {
             "pair_numbers": pair_numbers,
@@ -118,9 +118,10 @@ view! {
             "capacity": capacity,
         }
         Later { "turns": turns }
-        => update_path;
+        => update_path, mixes;
     Column as "Column":
-        Always { "dof": dof, "is_first": is_first, "lever": lever };
+        Always { "dof": dof, "is_first": is_first, "lever": lever }
+        => tree;
     Run as "Run":
         Always { "column": column, "place": place, "len": len };
     Tables<f64> as "Tables":

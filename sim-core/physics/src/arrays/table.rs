@@ -356,6 +356,6 @@ arrays! { m;
         Status "status" Counter [] "–" U32, Source::Counter,
             "Faults of the world, as bits: 1 = it was no longer finite, or a command of it where the run freezes for that, 8 = it was beyond the bounds of the run: it is frozen at its state before that frame, and `step`, until it is reset; 2 = the solver used up its iterations, 4 = contacts were left out; 0 = none.";
         ContactsLeftOut "contacts_left_out" Counter [] "–" U32, Source::Counter,
-            "Contacts that did not fit into contacts_max or rows_max: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
+            "Contacts that did not fit into contacts_max, rows_max or the memory of a GPU: the most of any substep of the last frame, and of the state shown where contact fields are asked for.";
     }
 }

@@ -12,6 +12,7 @@ pub mod pair_groups;
 pub mod params;
 pub mod passive;
 mod recast;
+pub mod rolled;
 pub mod scan;
 pub mod sensors;
 pub mod site;

@@ -273,6 +273,9 @@ pub trait Cx: Sized {
     const GATHERS_LOADS: bool = false;
     /// Does the solver add stiff contacts to a factor? Recorded code would be longer, and is without.
     const UPDATES_FACTORS: bool = true;
+    /// May a class of contacts have several trees, and may the solver loop over a large system ([`crate::constants::rolled`])? Only
+    /// recorded code has to be short for such models.
+    const TAKES_HEAPS: bool = false;
     /// Values that loops change: the values themselves on a backend where those are cells, else the cells. Call
     /// [`Cx::put_values`] before, and [`Cx::get_values`] after.
     #[inline(always)]
@@ -299,7 +302,7 @@ pub trait Cx: Sized {
     }
 
     /// Threads that share the work of a world, a power of two: its *lanes*. They all run the same code, and a value is the same in
-    /// all of them unless it comes from [`Cx::own`]. Where there is one, the methods for several are never called.
+    /// all of them unless it comes from [`Cx::own`]. Where there is one, the methods for several but `load_at` are never called.
     #[inline(always)]
     fn lanes(&self) -> usize {
         1
@@ -324,10 +327,10 @@ pub trait Cx: Sized {
     fn max_lanes(&mut self, _x: Self::F) -> Self::F {
         unreachable!("a world has one lane")
     }
-    /// Reads scalar `k + column` of a row; `column` is whole, and may differ between the lanes of a world.
+    /// Reads scalar `k + column` of a row; `column` is whole, and may differ between the lanes of a world. Recorded code alone calls it.
     #[inline(always)]
     fn load_at(&mut self, _t: Table, _row: Self::I, _k: usize, _column: Self::F) -> Self::F {
-        unreachable!("a world has one lane")
+        unreachable!("the code is not recorded")
     }
 
     /// A constant index.

@@ -46,6 +46,7 @@ impl Cx for Recorder {
 
     const GATHERS_LOADS: bool = true;
     const UPDATES_FACTORS: bool = false;
+    const TAKES_HEAPS: bool = true;
 
     #[track_caller]
     fn var(&mut self, x: Recorded) -> RecordedVariable {

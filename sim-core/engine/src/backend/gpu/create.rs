@@ -7,6 +7,7 @@ use super::kernels::blocks::with_blocks;
 use super::kernels::merged::merged;
 use super::kernels::places::Places;
 use super::kernels::programs::{How, Programs};
+use super::kernels::rolled::{check_software, is_large, rolled};
 use super::kernels::room::{Room, growing};
 use super::kernels::show;
 use super::kernels::workgroups;
@@ -21,7 +22,7 @@ use crate::backend::state::{Shape, finds_contacts, start};
 use crate::backend::{Backend, BackendError, Backends, Faults, Groups};
 use crate::random::Numbering;
 use crate::start::StartDraw;
-use sim_device::{AdapterInfo, Choice, Device, Replay};
+use sim_device::{AdapterInfo, AdapterKind, Choice, Device, Replay};
 use sim_model::Model;
 use sim_physics::arrays::{Array, Layout};
 use sim_physics::constants::Constants;
@@ -77,11 +78,16 @@ fn limits(info: &AdapterInfo, threads: usize, cuts: Cuts) -> Limits {
 }
 
 /// The constants of a model, as kernels with so many threads per world have them.
-pub(super) fn constants(model: &Model, threads: usize) -> Constants<f32> {
-    match threads {
-        1 => growing(Cow::Borrowed(model.constants())).cast(),
-        _ => growing(with_blocks(merged(model.constants()))).cast(),
-    }
+pub(super) fn constants(model: &Model, threads: usize, layout: &Layout) -> Constants<f32> {
+    let fields = layout.slots.iter().map(|slot| slot.field);
+    let shown = evaluation_stages(model.constants(), fields);
+    let solves = |stage: &StageId| stage.writes().contains(&Array::JointQdd);
+    let m = match threads {
+        1 if !is_large(model.constants()) => Cow::Borrowed(model.constants()),
+        1 => merged(model.constants()),
+        _ => with_blocks(merged(model.constants())),
+    };
+    growing(rolled(m, threads, shown.iter().any(solves))).cast()
 }
 
 /// The programs of frames with this layout, where their numbers lie, and the stages of the evaluation.
@@ -171,13 +177,16 @@ impl Gpu {
         let asked_threads = asked.world_threads;
         let threads =
             asked_threads.unwrap_or_else(|| workgroups::of_world(device.info(), model.constants()));
-        let constants = constants(model, threads);
+        let constants = constants(model, threads, layout);
         let m = &constants;
         let info = device.info();
+        if info.kind == AdapterKind::Software {
+            check_software(m)?;
+        }
         let how = How {
             limits: limits(info, threads, asked.cuts),
             lanes: threads,
-            exchange: workgroups::exchange(info),
+            exchange: workgroups::exchange(info, threads),
         };
         let (programs, places, shown) = programs(m, layout, model.substeps(), how)?;
         let sensors = model.contact_sensors();

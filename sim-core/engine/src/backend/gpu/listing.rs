@@ -52,7 +52,7 @@ pub fn listing(
 ) -> Result<Listing, BackendError> {
     let threads = world_threads
         .unwrap_or_else(|| workgroups::for_model(model.constants(), workgroups::SUBGROUP));
-    let m = &constants(model, threads);
+    let m = &constants(model, threads, layout);
     let how = How {
         limits: HARDWARE,
         lanes: threads,

@@ -15,7 +15,8 @@
 //! the solver's system (`sim_physics::step::solver`, `spread`). Classes of contacts of the same trees are merged for that (`kernels::merged`).
 //! Pairs of shapes are tested by blocks, whose loads a thread waits for together (`kernels::blocks`).
 //! Kernels without such work have one thread per world. Sums over threads have a fixed order. Models of more than 48 dofs have 16 or
-//! 32 threads per world, so that the solver's system stays in registers.
+//! 32 threads per world, so that the solver's system stays in registers. Where it still does not, loops solve it in memory
+//! (`kernels::rolled`).
 //!
 //! # Memory
 //! Programs read and write *fields* (`kernels::places`): value i of world w is component i % 4 of `fields[(i / 4) * worlds + w]`. State and

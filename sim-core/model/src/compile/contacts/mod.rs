@@ -357,17 +357,20 @@ impl ContactBuilder<'_> {
         }
         let part = |&(dof, _): &(usize, bool)| self.constants.pattern.part_of(dof);
         let parts: BTreeSet<usize> = columns.iter().map(part).collect();
+        let trees = (
+            first.map(|first| self.clusters[first].tree),
+            self.clusters[second].tree,
+        );
         Class {
-            trees: (
-                first.map(|first| self.clusters[first].tree),
-                self.clusters[second].tree,
-            ),
+            trees,
+            mixes: false,
             columns: columns
                 .iter()
                 .enumerate()
                 .map(|(c, &(dof, is_first))| Column {
                     dof,
                     is_first,
+                    tree: trees.0.filter(|_| is_first).unwrap_or(trees.1),
                     lever: pair::LEVERS + c,
                 })
                 .collect(),

@@ -70,7 +70,7 @@ fn contact_rows<C: Cx>(cx: &mut C, m: &ConstantsOf<C>, b: &mut BlockOf<C>) {
                 contact.write_turning(cx, b, block);
             }
             // ω × (ω × r) of free bodies, by which MuJoCo's J q̈ is less than ours
-            let swing = swing_between(cx, m, b, class);
+            let swing = swing_between(cx, m, b, class, |cx, k| contact.of_pair(cx, k));
             contact.write_softness(cx, m, velocity, swing);
         });
     }
@@ -166,30 +166,35 @@ impl<'a, C: Cx> Contact<'a, C> {
         }
     }
 
+    /// The contact's point from the reference point of a tree.
+    #[inline(always)]
+    fn point_from(&self, b: &BlockOf<C>, tree: usize) -> Vec3<C::F> {
+        let (here, reference) = (self.class.trees.1, &b.work.reference);
+        match tree == here {
+            true => self.point,
+            false => self.point + (reference[here] - reference[tree]),
+        }
+    }
+
     /// Writes J and the tangents, and returns J q̇.
     #[inline(always)]
     fn write_jacobian(&self, cx: &mut C, b: &BlockOf<C>) -> [C::F; 3] {
-        let (t, class, frame, w) = (self.t, self.class, &self.frame, &b.work);
-        // the same point from the reference point of the first tree
-        let second = w.reference[class.trees.1];
-        let point_first = match class.trees.0 {
-            Some(tree) if tree != class.trees.1 => self.point + (second - w.reference[tree]),
-            _ => self.point,
-        };
-        // p × axis, about the reference point of each side's tree
-        let mut torques = [[Vec3::zero(); 3]; 2];
-        for (i, axis) in frame.iter().enumerate() {
-            torques[0][i] = point_first.cross(*axis);
-            torques[1][i] = self.point.cross(*axis);
-        }
+        let (t, frame) = (self.t, &self.frame);
         // J(i, dof) = ± (axis · v + (point × axis) · ω)
         let mut velocity = [C::F::c(0.0); 3];
-        for (c, column) in class.columns.iter().enumerate() {
-            let Spatial([linear, angular]) = w.motion[column.dof];
+        // p × axis, about the reference point of the tree whose dofs follow
+        let (mut tree, mut torques) = (usize::MAX, [Vec3::zero(); 3]);
+        for (c, column) in self.class.columns.iter().enumerate() {
+            if column.tree != tree {
+                tree = column.tree;
+                for (torque, axis) in torques.iter_mut().zip(frame) {
+                    *torque = self.point_from(b, tree).cross(*axis);
+                }
+            }
+            let Spatial([linear, angular]) = b.work.motion[column.dof];
             // 1, -1, or 0 where the dof moves both bodies alike or neither
             let lever = self.of_pair(cx, column.lever);
             let speed = cx.get(&b.joint_qd[column.dof]);
-            let torques = &torques[usize::from(!column.is_first)];
             let mut jacobian = [C::F::c(0.0); 3];
             // v = J q̇, where worlds without the contact get -0, which later sums ignore
             for i in 0..3 {

@@ -1,9 +1,11 @@
 //! The linear system of an iteration, H x = rhs, with the terms of contacts.
 
 use super::hold::Hold;
+use super::rolled::Rolled;
 use super::{assembly, contacts, gather, updates};
 use crate::arrays::Workspace;
 use crate::constants::Constants;
+use crate::constants::rolled::RolledSystem;
 use crate::lane::{Cx, MaskOf, Num, Real};
 use crate::math::factor::{Pattern, solve as solve_linear};
 use crate::step::{BlockOf, ConstantsOf};
@@ -73,6 +75,11 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     touching: Option<MaskOf<C>>,
     coupling: Option<MaskOf<C>>,
 ) -> C::F {
+    if C::TAKES_HEAPS
+        && let Some(tables) = m.contacts.rolled
+    {
+        return solve_rolled::<_, TURNS>(cx, m, b, x, tables);
+    }
     let stiff_touching = touching.filter(|_| updates::may_be_stiff::<C>(&m.contacts));
     let target = x.target();
     // worlds whose matrix turns out to have lost M solve once more, from M and the rows of joints
@@ -85,6 +92,32 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     }
     without_signs_of_zeros(target.values(&mut b.work));
     stiffening
+}
+
+/// [`solve_system`] by loops over a matrix of all dofs.
+#[inline(always)]
+fn solve_rolled<C: Cx, const TURNS: bool>(
+    cx: &mut C,
+    m: &ConstantsOf<C>,
+    b: &mut BlockOf<C>,
+    x: Unknown<C>,
+    tables: RolledSystem,
+) -> C::F {
+    let w = &mut b.work;
+    let system = Rolled::<C> {
+        tables,
+        contacts: &m.contacts,
+        pattern: &m.pattern,
+        mass: &w.mass_matrix,
+        with_joints: &w.hessian,
+    };
+    match x {
+        Unknown::Minimum(hold) => {
+            system.solve::<TURNS>(cx, &mut w.minimum, Some(&mut b.pull), hold)
+        }
+        // the right-hand side of a correction is complete: contacts add to H alone
+        Unknown::Missing => system.solve::<TURNS>(cx, &mut w.missing, None, None),
+    }
 }
 
 /// [`solve_system`] by the sum of M and the terms of all rows.

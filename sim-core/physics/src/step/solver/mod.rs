@@ -59,6 +59,7 @@
 //! |---|---|
 //! | `linear` | the system of an iteration |
 //! | `rows`, `cones` | laws of joint rows and of contacts: force, stiffness, cost |
+//! | `rolled` | the system by loops, in recorded programs of models with many dofs |
 //! | `spread` | the system, and products with M, where several lanes share a world |
 //! | `ties` | sums over constraints with Jacobians found at run time |
 //! | `contacts`, `assembly` | sums over contacts, and their Jᵀ W J |
@@ -87,6 +88,7 @@ mod noslip;
 mod own_rows;
 mod progress;
 mod refine;
+mod rolled;
 mod rows;
 mod spread;
 mod start;

@@ -1,6 +1,7 @@
 //! Stages in which several threads share a world, run in lockstep on the CPU, beside those of one thread.
 
 use super::*;
+use sim_physics::constants::rolled::RolledSystem;
 use sim_record::split::{Limits, Prices, Split, split};
 
 /// Numbers of threads that a world may have, and states that are compared.
@@ -36,9 +37,21 @@ fn in_kernels(m: &Constants<f32>, stage: StageId, lanes: usize, most: usize) -> 
 
 #[test]
 fn several_lanes_solve_what_one_solves() {
+    compare(&LANES, |_| {});
+}
+
+#[test]
+fn loops_over_a_system_in_memory_solve_what_is_unrolled() {
+    // several lanes keep systems without torsional friction in registers
+    compare(&[1, 8], RolledSystem::add_to);
+}
+
+/// Compares recorded stages with the code of one world. `prepare` changes the constants first.
+fn compare(lanes: &[usize], prepare: fn(&mut Constants<f32>)) {
     for mut case in cases() {
         // few of the models need a correction
         case.m.solver.refinements = 1;
+        prepare(&mut case.m);
         let m = &case.m;
         let is_shared = |stage: &StageId| {
             let names = ["contact_rows", "solver", "refine"];
@@ -46,7 +59,7 @@ fn several_lanes_solve_what_one_solves() {
         };
         let kernels: Vec<(StageId, usize, [Split; 2])> = needed(m)
             .filter(is_shared)
-            .flat_map(|stage| LANES.map(|lanes| (stage, lanes)))
+            .flat_map(|stage| lanes.iter().map(move |lanes| (stage, *lanes)))
             .map(|(stage, lanes)| {
                 let parts = KERNEL_COSTS.map(|most| in_kernels(m, stage, lanes, most));
                 (stage, lanes, parts)

@@ -4,12 +4,15 @@
 //! long kernels and idle threads: each foot of a quadruped is a class with one contact. Classes of the same trees become one, whose
 //! columns are the dofs of all. A contact's levers are 0 for dofs that do not move its bodies. Where a robot can touch itself in many
 //! places, as a humanoid can, one class would have mostly zeros: then some stay apart, as long as all their code is short.
+//!
+//! In a heap of bodies each pair of them is a class of its own. Where these are too many, one class has the contacts of all trees, and
+//! Jacobians as wide as the model: the shortest code, though it mostly computes zeros. Its points are relative to the reference point of
+//! one tree, one with a fixed base if there is any, so levers are known to 6e-8 of the distance from there.
 
+use super::rolled::LONGEST;
 use super::room::{others, size};
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::{
-    Class, Column, Contacts, Memory, Pair, Run, pair, row, turning,
-};
+use sim_physics::constants::contact::{Class, Column, Contacts, Pair, Run, pair, row, turning};
 use sim_physics::constants::sensors::{ContactSensor, SensorKind as Kind, TouchSensor};
 use sim_physics::lane::{Fixed, Table};
 use sim_physics::math::factor::UpdatePath;
@@ -23,6 +26,12 @@ const WIDER_MAX: usize = 2;
 /// Columns of all classes together, as the solver's code has them: more classes are merged beyond these limits, those first whose contacts
 /// get the fewest zeros. Or twice the dofs, if that is more: one class with the ground and one of the robot with itself have so many.
 const COLUMNS_ALL: usize = 64;
+
+/// Instructions of the solver's kernel for a class, and for each of its columns: about those of 60 balls on the ground, and of 100 in a heap.
+const OF_CLASS: usize = 1000;
+const OF_COLUMN: usize = 50;
+/// Most instructions for all classes: beyond, the kernel would be refused ([`LONGEST`]). Then classes of different trees are merged, too.
+const APART_MAX: usize = LONGEST;
 
 /// The constants with fewer classes of contacts, where that helps.
 pub(in crate::backend::gpu) fn merged(m: &Constants<f64>) -> Cow<'_, Constants<f64>> {
@@ -123,16 +132,32 @@ fn parts(classes: &[Class<f64>], all: usize) -> Vec<Vec<usize>> {
         group.sort_unstable();
         parts[a] = Part::new(classes, group);
     }
-    parts.into_iter().map(|part| part.classes).collect()
+    let (moving, mut others): (Vec<Part>, Vec<Part>) =
+        parts.into_iter().partition(|part| part.columns > 0);
+    let cost = |part: &Part| OF_CLASS + OF_COLUMN * part.columns;
+    let apart: usize = moving.iter().map(cost).sum();
+    let classes_of = |parts: &[Part]| -> Vec<usize> {
+        let mut all: Vec<usize> = parts.iter().flat_map(|p| p.classes.clone()).collect();
+        all.sort_unstable();
+        all
+    };
+    if apart > APART_MAX {
+        let together = Part::new(classes, classes_of(&moving));
+        match WIDER_MAX * cost(&together) <= apart {
+            true => others.push(together),
+            false => others.extend(moving),
+        }
+    } else {
+        others.extend(moving);
+    }
+    others.into_iter().map(|part| part.classes).collect()
 }
 
-/// Dofs of some classes, rising, and whether they are of the first side's tree.
-fn columns(classes: &[Class<f64>], part: &[usize]) -> Vec<(usize, bool)> {
+/// Dofs of some classes, rising, each with its column in one of them.
+fn columns(classes: &[Class<f64>], part: &[usize]) -> Vec<Column> {
     let columns = part.iter().flat_map(|&k| &classes[k].columns);
-    let columns: BTreeSet<_> = columns
-        .map(|column| (column.dof, column.is_first))
-        .collect();
-    columns.into_iter().collect()
+    let columns: BTreeMap<usize, Column> = columns.map(|column| (column.dof, *column)).collect();
+    columns.into_values().collect()
 }
 
 /// The new class that has an old one.
@@ -154,8 +179,8 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         let was = &t.classes[pair.class].columns;
         let mut numbers = t.tables.numbers[first..first + pair::LEVERS].to_vec();
         pair.class = new_class(parts, pair.class);
-        numbers.extend(columns[pair.class].iter().map(|(dof, _)| {
-            let column = was.iter().find(|column| column.dof == *dof);
+        numbers.extend(columns[pair.class].iter().map(|new| {
+            let column = was.iter().find(|column| column.dof == new.dof);
             column.map_or(0.0, |column| t.tables.numbers[first + column.lever])
         }));
         numbers.resize(stride, 0.0);
@@ -187,6 +212,15 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         .flat_map(|class| [class.first, class.capacity]);
     t.tables.indices.extend(room.map(|x| x as u32));
     t.classes = classes;
+    // points of a class are relative to one reference point
+    let indices = t.handles.pair_indices;
+    for (p, pair) in t.pairs.iter().enumerate() {
+        let class = &t.classes[pair.class];
+        if class.mixes {
+            let place = indices.base + p * indices.stride + pair::ORIGIN;
+            t.tables.indices[place] = class.trees.1 as u32;
+        }
+    }
     merge_impedances(&mut t, parts);
     merge_bodies(&mut t, parts, &m.contacts.pairs);
     let [first_end, capacity_end] = t.row_ends();
@@ -200,7 +234,7 @@ fn with_classes(m: &Constants<f64>, parts: &[Vec<usize>]) -> Contacts<f64> {
         stride: row_len.next_multiple_of(4),
         rows: first_end + capacity_end - 2,
     };
-    replace_rows(&mut t.memory, rows);
+    replace_rows(&mut t, rows);
     t
 }
 
@@ -243,15 +277,15 @@ fn merge_bodies(t: &mut Contacts<f64>, parts: &[Vec<usize>], old_pairs: &[Pair])
 }
 
 /// Gives the rows of contacts another room, and moves what lies behind them.
-fn replace_rows(memory: &mut Memory, rows: Table) {
-    let (old, new) = (size(memory.rows), size(rows));
-    for table in others(memory) {
+fn replace_rows(t: &mut Contacts<f64>, rows: Table) {
+    let (old, new) = (size(t.memory.rows), size(rows));
+    for table in others(t) {
         if table.base > rows.base {
             table.base = table.base + new - old;
         }
     }
-    memory.len = memory.len + new - old;
-    memory.rows = rows;
+    t.memory.len = t.memory.len + new - old;
+    t.memory.rows = rows;
 }
 
 /// A class of the pairs of some classes; `t` has the new scalars of pairs already, and the old classes.
@@ -260,11 +294,11 @@ fn class(
     t: &Contacts<f64>,
     part: &[usize],
     number: usize,
-    columns: &[(usize, bool)],
+    columns: &[Column],
 ) -> Class<f64> {
     let old: Vec<&Class<f64>> = part.iter().map(|&k| &t.classes[k]).collect();
     let place = |dof: usize| {
-        let index = columns.iter().position(|column| column.0 == dof);
+        let index = columns.iter().position(|column| column.dof == dof);
         index.expect("a dof of the class")
     };
     let mut entries = vec![BTreeSet::new(); columns.len()];
@@ -282,7 +316,7 @@ fn class(
         false => &m.pattern,
     };
     let entries = entries.into_iter().enumerate().map(|(c, others)| {
-        let at = |o: usize| pattern.at(columns[c].0, columns[o].0);
+        let at = |o: usize| pattern.at(columns[c].dof, columns[o].dof);
         Run::from_columns(others.into_iter().map(|o| (o, at(o))))
     });
     let numbers = t.handles.pair_numbers;
@@ -294,15 +328,17 @@ fn class(
         let is_shared = pairs.iter().all(|&p| scalar(p, k).to_bits() == x.to_bits());
         is_shared.then_some(x)
     });
-    let of_dofs = columns.iter().enumerate().map(|(c, (dof, _))| (c, *dof));
+    let of_dofs = (columns.iter().enumerate()).map(|(c, column)| (c, column.dof));
     let parts: BTreeSet<usize> = old.iter().flat_map(|class| class.parts.clone()).collect();
+    // a fixed base stays where it is
+    let is_fixed = |class: &&&Class<f64>| m.trees[class.trees.1].free.is_none();
     Class {
-        trees: old[0].trees,
+        trees: old.iter().find(is_fixed).unwrap_or(&old[0]).trees,
+        mixes: old.iter().any(|class| class.trees != old[0].trees),
         columns: (columns.iter().enumerate())
-            .map(|(c, &(dof, is_first))| Column {
-                dof,
-                is_first,
+            .map(|(c, column)| Column {
                 lever: pair::LEVERS + c,
+                ..*column
             })
             .collect(),
         runs: Run::from_columns(of_dofs),

@@ -5,6 +5,7 @@ pub(super) mod bookkeeping;
 pub(super) mod merged;
 pub(super) mod places;
 pub(super) mod programs;
+pub(super) mod rolled;
 pub(super) mod room;
 pub(super) mod show;
 pub(super) mod workgroups;

@@ -1,6 +1,7 @@
 //! Records the physics code of a step and of an evaluation, and partitions it into kernels that a driver compiles in good time.
 
 use super::places::Places;
+use super::rolled::LONGEST;
 use crate::backend::BackendError;
 use crate::backend::gather::gather;
 use sim_physics::arrays::{Array, Field, Source};
@@ -8,16 +9,11 @@ use sim_physics::constants::Constants;
 use sim_physics::lane::Num;
 use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
-use sim_physics::step::solver::is_spread;
 use sim_physics::times;
 use sim_record::split::{Kernel, Limits, Part, Split, split};
 use sim_record::wgsl::{Exchange, ProgramOptions};
 use sim_record::{RecordError, Recorded, Recording};
 use stages_recorded::{between, effects, kept, run};
-
-/// Most products of a factor that each thread of a world computes by itself: a driver takes minutes for the kernel of more. A full matrix
-/// of 70 dofs has so many.
-const PRODUCTS_MAX: usize = 60_000;
 
 /// How kernels are made.
 #[derive(Clone, Copy)]
@@ -58,7 +54,7 @@ impl Programs {
     /// within the limits, where the code allows it.
     ///
     /// # Errors
-    /// Physics code that cannot be recorded; tests of the recorder rule that out. A factor of more than [`PRODUCTS_MAX`].
+    /// Physics code that cannot be recorded; tests of the recorder rule that out. A kernel of more than [`LONGEST`].
     pub fn new(
         m: &Constants<f32>,
         places: &Places,
@@ -73,7 +69,6 @@ impl Programs {
             true => 1,
             false => how.lanes,
         };
-        check_system(m, lanes, how.limits)?;
         // searches on hulls nest loops as deep as a recording may: a loop over substeps does not fit around them
         let (inside, outside) = match m.contacts.groups.is_empty() {
             true => (substeps, 1),
@@ -81,43 +76,15 @@ impl Programs {
         };
         let (recording, options) =
             step(m, places, &step_stages(m), inside, lanes).map_err(refused)?;
-        let (step, step_spare) = partition(&recording, &options, how, places.len, outside);
+        let (step, step_spare) = partition(&recording, &options, how, places.len, outside)?;
         let (recording, options) =
             evaluation(m, places, shown, computed, wanted).map_err(refused)?;
-        let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len, 1);
+        let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len, 1)?;
         Ok(Programs {
             step,
             evaluate,
             spare: step_spare.max(evaluate_spare),
         })
-    }
-}
-
-/// Refuses systems that make kernels of hundreds of thousands of statements: of dofs that contacts can couple, and that the threads of a
-/// world do not share.
-fn check_system(m: &Constants<f32>, lanes: usize, limits: Limits) -> Result<(), BackendError> {
-    let dofs = m.dofs.len();
-    // kernels are cut inside of the solver's loop, or it has no contacts
-    let is_short = limits.repeated < usize::MAX || m.contacts.groups.is_empty();
-    // torsional friction has no spread system
-    let turns = m.contacts.classes.iter().any(|class| class.turns.is_some());
-    if is_short || (is_spread(lanes, dofs) && !turns) {
-        return Ok(());
-    }
-    let pattern = match m.contacts.couples() {
-        true => &m.coupled.pattern,
-        false => &m.pattern,
-    };
-    let of_row = |row| (0..row).filter(|column| pattern.has(row, *column)).count();
-    let products: usize = (0..dofs).map(of_row).map(|n| n * (n + 1) / 2).sum();
-    match products > PRODUCTS_MAX {
-        false => Ok(()),
-        true => Err(BackendError::Program {
-            reason: format!(
-                "contacts can join its {dofs} dofs to one system, and the factor of that has {products} products; \
-                 a driver takes minutes to compile more than {PRODUCTS_MAX}"
-            ),
-        }),
     }
 }
 
@@ -134,12 +101,23 @@ fn partition(
     how: How,
     spare: u32,
     times: usize,
-) -> (KernelSequence, u32) {
+) -> Result<(KernelSequence, u32), BackendError> {
     let options = ProgramOptions {
         exchange: how.exchange,
         ..options.clone()
     };
     let split = split(recording, &options, how.limits, spare);
+    let is_hardware = how.limits.repeated == usize::MAX;
+    let costs = split.kernels.iter().map(|k| k.cost(&how.limits.prices));
+    let longest = costs.max().unwrap_or(0);
+    if is_hardware && longest > LONGEST {
+        return Err(BackendError::Program {
+            reason: format!(
+                "a kernel has {longest} instructions, and a driver takes minutes to compile more than {LONGEST}: \
+                 bodies may touch in too many ways"
+            ),
+        });
+    }
     let source = |kernel: &Kernel| {
         let lanes = kernel.recording().lanes() as u32;
         let is_world = lanes > 1 && how.exchange == Exchange::Workgroup;
@@ -167,7 +145,7 @@ fn partition(
             with_joined(split.order, joined, times)
         }
     };
-    (KernelSequence { kernels, order }, split.spare as u32)
+    Ok((KernelSequence { kernels, order }, split.spare as u32))
 }
 
 fn repeated(iterations: usize, parts: Vec<Part>) -> Part {

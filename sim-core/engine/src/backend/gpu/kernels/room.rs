@@ -7,7 +7,7 @@
 //! on a height field than one can have, gets all the room, too: it counts all that it left out in one number.
 
 use sim_physics::constants::Constants;
-use sim_physics::constants::contact::Memory;
+use sim_physics::constants::contact::Contacts;
 use sim_physics::lane::Table;
 use std::borrow::Cow;
 
@@ -21,21 +21,22 @@ pub(in crate::backend::gpu) fn growing(m: Cow<'_, Constants<f64>>) -> Cow<'_, Co
         return m;
     }
     let mut m = m.into_owned();
-    let memory = &mut m.contacts.memory;
-    let (first, size) = (memory.rows.base, size(memory.rows));
-    for table in others(memory) {
+    let t = &mut m.contacts;
+    let (first, size) = (t.memory.rows.base, size(t.memory.rows));
+    for table in others(t) {
         if table.base > first {
             table.base -= size;
         }
     }
-    memory.rows.base = memory.len - size;
-    m.contacts.room_grows = true;
+    t.memory.rows.base = t.memory.len - size;
+    t.room_grows = true;
     Cow::Owned(m)
 }
 
 /// The tables besides rows.
-pub(super) fn others(memory: &mut Memory) -> [&mut Table; 10] {
-    [
+pub(super) fn others(t: &mut Contacts<f64>) -> Vec<&mut Table> {
+    let memory = &mut t.memory;
+    let mut tables = vec![
         &mut memory.poses,
         &mut memory.origins,
         &mut memory.counts,
@@ -46,7 +47,11 @@ pub(super) fn others(memory: &mut Memory) -> [&mut Table; 10] {
         &mut memory.field_candidates,
         &mut memory.field_cells,
         &mut memory.field_prisms,
-    ]
+    ];
+    if let Some(system) = &mut t.rolled {
+        tables.extend([&mut system.matrix, &mut system.sides]);
+    }
+    tables
 }
 
 /// Numbers that a table takes.
@@ -137,6 +142,7 @@ impl Room {
 mod tests {
     use super::*;
     use sim_model::{Body, Collision, Description, Pose, Shape};
+    use sim_physics::constants::rolled::RolledSystem;
 
     /// Bodies of so many cylinders each over a height, so that tables of all sizes lie behind the rows.
     fn constants(cylinders: [usize; 2]) -> Constants<f64> {
@@ -160,18 +166,19 @@ mod tests {
 
     #[test]
     fn rows_lie_behind_all_other_tables_and_rooms_follow_each_other() {
-        let fixed = constants([9, 3]);
+        let mut fixed = constants([9, 3]);
+        RolledSystem::add_to(&mut fixed);
         let mut m = growing(Cow::Borrowed(&fixed)).into_owned();
         assert!(m.contacts.room_grows && !fixed.contacts.room_grows);
         let len = m.contacts.memory.len;
         assert_eq!(len, fixed.contacts.memory.len);
         let rows = m.contacts.memory.rows;
-        let mut spans: Vec<_> = others(&mut m.contacts.memory)
-            .map(|table| (table.base, table.base + size(*table)))
+        let mut spans: Vec<_> = others(&mut m.contacts)
             .into_iter()
+            .map(|table| (table.base, table.base + size(*table)))
             .filter(|(first, end)| first < end)
             .collect();
-        assert!(spans.len() > 3);
+        assert!(spans.len() > 5);
         spans.push((rows.base, len));
         spans.sort_unstable();
         assert!(spans.windows(2).all(|pair| pair[0].1 <= pair[1].0));

@@ -1,5 +1,6 @@
 //! Threads per workgroup, and per world. Measured on an H100; other cards were not.
 
+use super::rolled::is_large;
 use sim_device::{AdapterInfo, AdapterKind};
 use sim_physics::constants::Constants;
 use sim_physics::step::solver::is_spread;
@@ -24,19 +25,26 @@ pub(in crate::backend::gpu) fn physics(info: &AdapterInfo) -> u32 {
 /// 32 has four worlds, which wait for the slowest of four instead of 32.
 const WORLD_THREADS: usize = 8;
 
+/// The least threads of a subgroup: 32 where a driver does not tell.
+fn subgroup(info: &AdapterInfo) -> u32 {
+    match info.subgroup_max > BOOKKEEPING {
+        true => SUBGROUP,
+        false => info.subgroup_min,
+    }
+}
+
 /// The threads of a world on an adapter. The software driver computes on the CPU, and more threads only add work there.
 pub(in crate::backend::gpu) fn of_world(info: &AdapterInfo, m: &Constants<f64>) -> usize {
     match info.kind {
         AdapterKind::Software => 1,
         _ if !info.shuffles => 1,
-        // a driver that does not tell its subgroups
-        _ if info.subgroup_max > BOOKKEEPING => for_model(m, SUBGROUP),
-        _ => for_model(m, info.subgroup_min),
+        _ => for_model(m, subgroup(info)),
     }
 }
 
 /// The threads of a world where subgroups have at least so many: more of them where eight cannot keep the solver's system in registers. A
-/// world stays inside a subgroup. Torsional friction has no system that threads share.
+/// world stays inside a subgroup. Torsional friction has no system in registers. Loops over a large system take as many threads as there
+/// are.
 pub(in crate::backend::gpu) fn for_model(m: &Constants<f64>, subgroup: u32) -> usize {
     let numbers = [WORLD_THREADS, 2 * WORLD_THREADS, SUBGROUP as usize];
     let mut fitting = numbers
@@ -47,12 +55,16 @@ pub(in crate::backend::gpu) fn for_model(m: &Constants<f64>, subgroup: u32) -> u
         .clone()
         .filter(|threads| is_spread(*threads, m.dofs.len()));
     let shared = if turns { None } else { shared.next() };
-    shared.or(fitting.next()).unwrap_or(1)
+    let usual = match is_large(m) {
+        true => fitting.next_back(),
+        false => fitting.next(),
+    };
+    shared.or(usual).unwrap_or(1)
 }
 
-/// How the threads of a world exchange values.
-pub(in crate::backend::gpu) fn exchange(info: &AdapterInfo) -> Exchange {
-    match info.shuffles {
+/// How so many threads of a world exchange values: by shuffles, where a world stays inside a subgroup.
+pub(in crate::backend::gpu) fn exchange(info: &AdapterInfo, threads: usize) -> Exchange {
+    match info.shuffles && threads <= subgroup(info) as usize {
         true => Exchange::Subgroup,
         false => Exchange::Workgroup,
     }

@@ -1,5 +1,9 @@
 //! Shapes of a model as physics code reads them: where they are, which pairs may touch, and how soft they are.
 
+mod friction;
+
+pub use friction::{FrictionCombine, rule};
+
 use super::Impedance;
 use super::clip::Cut;
 use super::height_field::FieldTables;
@@ -8,7 +12,8 @@ use super::hull::reference::ReferenceSearch;
 use super::pair_groups::Group;
 pub use super::pair_groups::{Kind, PAIR_KINDS};
 use super::recast::{Recast, recast, same};
-use crate::lane::{Fixed, Num, Real, Table, Tables};
+use super::rolled::RolledSystem;
+use crate::lane::{Fixed, Real, Table, Tables};
 use crate::math::factor::UpdatePath;
 use std::sync::Arc;
 
@@ -58,6 +63,8 @@ recast! {
         pub memory: Memory,
         /// Do programs read first rows and capacities of classes when they run? Then worlds can get more room, up to that of `classes`.
         pub room_grows: bool,
+        /// Where loops solve the system, in recorded programs of models with many dofs.
+        pub rolled: Option<RolledSystem>,
         /// Of each pair, torsional and rolling friction over sliding friction; without rows where no pair has any.
         pub turning: Fixed,
         /// How friction differs between the tangents of each pair ([`skew`]); without rows where it differs in none.
@@ -204,22 +211,6 @@ pub mod adhesion {
     pub const COLUMNS: usize = 3;
 }
 
-/// Which friction of two shapes counts for a pair, where it varies.
-pub mod rule {
-    /// What [`FrictionCombine`](super::FrictionCombine) makes of both.
-    pub const COMBINED: f64 = 0.0;
-    /// The larger one.
-    pub const LARGER: f64 = 1.0;
-    /// That of the first shape, which has a higher priority.
-    pub const FIRST: f64 = 2.0;
-    /// That of the second shape.
-    pub const SECOND: f64 = 3.0;
-    /// The pair's own.
-    pub const OWN: f64 = 4.0;
-    /// That of the model, in all worlds.
-    pub const FIXED: f64 = 5.0;
-}
-
 recast! {
     /// Impedances of contacts where pairs differ; all empty where all have `Constants::contact_impedance`.
     #[derive(Clone, Debug)]
@@ -248,33 +239,6 @@ impl<R> Default for PairImpedances<R> {
             all: Vec::new(),
             of_pair: Fixed::default(),
             of_classes: Vec::new(),
-        }
-    }
-}
-
-/// How the coefficients of friction of two shapes that touch combine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum FrictionCombine {
-    /// The larger one (MuJoCo: `mj_contactParam`).
-    #[default]
-    Max,
-    /// Their mean.
-    Mean,
-    /// The smaller one.
-    Min,
-    /// Their product.
-    Product,
-}
-
-impl FrictionCombine {
-    /// The coefficient of a pair.
-    #[inline(always)]
-    pub fn coefficient<F: Num>(self, a: F, b: F) -> F {
-        match self {
-            FrictionCombine::Max => a.max(b),
-            FrictionCombine::Mean => (a + b) * F::c(0.5),
-            FrictionCombine::Min => a.min(b),
-            FrictionCombine::Product => a * b,
         }
     }
 }
@@ -358,8 +322,11 @@ recast! {
     /// Contacts whose Jacobians have the same dofs as columns.
     #[derive(Clone, Debug)]
     pub struct Class<R> {
-        /// Trees of the bodies on its two sides; the first is none where that side is static.
+        /// Trees of the bodies on its two sides; the first is none where that side is static. Points are relative to the reference point
+        /// of the second. The sides of a class that `mixes` have no trees of their own.
         pub trees: (Option<usize>, usize),
+        /// May its contacts be of different trees, which the levers of pairs tell? Only classes of recorded programs do.
+        pub mixes: bool,
         /// Its dofs, rising.
         pub columns: Vec<Column>,
         /// The same dofs, by runs.
@@ -389,8 +356,10 @@ recast! {
 pub struct Column {
     /// The dof.
     pub dof: usize,
-    /// Is it of the first side's tree?
+    /// Is it of the first side's tree? Digests of models have it.
     pub is_first: bool,
+    /// Its tree.
+    pub tree: usize,
     /// Place of its lever among the scalars of a pair: how it moves the second body relative to the first, 1, -1 or 0.
     pub lever: usize,
 }
@@ -624,6 +593,7 @@ impl<R: Real> Contacts<R> {
                 len: 0,
             },
             room_grows: false,
+            rolled: None,
             turning: Fixed::default(),
             skew: Fixed::default(),
             surface_velocities: Fixed::default(),
