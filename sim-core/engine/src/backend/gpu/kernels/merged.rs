@@ -132,25 +132,23 @@ fn parts(classes: &[Class<f64>], all: usize) -> Vec<Vec<usize>> {
         group.sort_unstable();
         parts[a] = Part::new(classes, group);
     }
-    let (moving, mut others): (Vec<Part>, Vec<Part>) =
+    // contacts that move nothing come last, as their key has it
+    let (mut moving, still): (Vec<Part>, Vec<Part>) =
         parts.into_iter().partition(|part| part.columns > 0);
     let cost = |part: &Part| OF_CLASS + OF_COLUMN * part.columns;
     let apart: usize = moving.iter().map(cost).sum();
-    let classes_of = |parts: &[Part]| -> Vec<usize> {
-        let mut all: Vec<usize> = parts.iter().flat_map(|p| p.classes.clone()).collect();
-        all.sort_unstable();
-        all
-    };
     if apart > APART_MAX {
-        let together = Part::new(classes, classes_of(&moving));
-        match WIDER_MAX * cost(&together) <= apart {
-            true => others.push(together),
-            false => others.extend(moving),
+        let all = moving.iter().flat_map(|part| part.classes.iter().copied());
+        let together = Part::new(classes, all.collect::<BTreeSet<_>>().into_iter().collect());
+        if WIDER_MAX * cost(&together) <= apart {
+            moving = vec![together];
         }
-    } else {
-        others.extend(moving);
     }
-    others.into_iter().map(|part| part.classes).collect()
+    moving
+        .into_iter()
+        .chain(still)
+        .map(|part| part.classes)
+        .collect()
 }
 
 /// Dofs of some classes, rising, each with its column in one of them.

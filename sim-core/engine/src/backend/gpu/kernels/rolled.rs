@@ -3,6 +3,8 @@
 use crate::backend::BackendError;
 use sim_physics::constants::Constants;
 use sim_physics::constants::rolled::RolledSystem;
+use sim_physics::lane::Real;
+use sim_physics::math::factor::Pattern;
 use sim_physics::step::solver::is_spread;
 use std::borrow::Cow;
 
@@ -13,12 +15,17 @@ pub(super) const LONGEST: usize = 60_000;
 /// and minutes for three times as much.
 const PRODUCTS_MAX: usize = 20_000;
 
-/// Can contacts join so many dofs that code without loops over them is too long?
-pub(in crate::backend::gpu) fn is_large(m: &Constants<f64>) -> bool {
-    let pattern = match m.contacts.couples() {
+/// The pattern of the system with all contacts.
+fn pattern<R: Real>(m: &Constants<R>) -> &Pattern {
+    match m.contacts.couples() {
         true => &m.coupled.pattern,
         false => &m.pattern,
-    };
+    }
+}
+
+/// Can contacts join so many dofs that code without loops over them is too long?
+pub(in crate::backend::gpu) fn is_large(m: &Constants<f64>) -> bool {
+    let pattern = pattern(m);
     let of_row = |row| (0..row).filter(|column| pattern.has(row, *column)).count();
     let counts = (0..m.dofs.len()).map(of_row);
     let products: usize = counts.map(|n| n * (n + 1) / 2).sum();
@@ -33,10 +40,7 @@ pub(in crate::backend::gpu) fn check_software(m: &Constants<f32>) -> Result<(), 
     if m.contacts.rolled.is_none() {
         return Ok(());
     }
-    let pattern = match m.contacts.couples() {
-        true => &m.coupled.pattern,
-        false => &m.pattern,
-    };
+    let pattern = pattern(m);
     let dofs = m.dofs.len();
     // a program may have the loops over contacts, those that eliminate, and those that substitute
     let parts: usize = pattern
