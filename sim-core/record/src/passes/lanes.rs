@@ -205,7 +205,7 @@ impl Sharer<'_> {
 fn sums(statement: &Statement, values: &[Op]) -> Option<BTreeSet<u32>> {
     let Statement::Loop {
         index,
-        bounds: Bounds::Span { .. },
+        bounds: Bounds::Span { end, .. },
         body,
     } = statement
     else {
@@ -218,6 +218,7 @@ fn sums(statement: &Statement, values: &[Op]) -> Option<BTreeSet<u32>> {
     let mut iteration = Iteration {
         values,
         index: *index,
+        end: *end,
         sums: &assigned,
         partial: HashMap::new(),
         loads: Vec::new(),
@@ -249,6 +250,8 @@ fn names(body: &[Statement], declared: &mut HashSet<u32>, assigned: &mut BTreeSe
 struct Iteration<'a> {
     values: &'a [Op],
     index: u32,
+    /// What follows the last row: no iteration has it.
+    end: Row,
     sums: &'a BTreeSet<u32>,
     /// Values that are a variable plus something that does not depend on it.
     partial: HashMap<u32, u32>,
@@ -382,6 +385,6 @@ impl Iteration<'_> {
         stores.iter().all(|cell| is_own(cell.row))
             && (self.loads.iter())
                 .filter(|load| stores.iter().any(|store| meets(load, store)))
-                .all(|load| is_own(load.row))
+                .all(|load| is_own(load.row) || load.row == self.end)
     }
 }

@@ -202,6 +202,35 @@ fn rows_whose_column_an_index_names_are_shared() {
     }
 }
 
+#[test]
+fn rows_that_read_the_one_behind_all_of_them_are_shared() {
+    let code = |cx: &mut Recorder, list: &List, x: &[Recorded]| {
+        // what gives a kernel its lanes
+        let mut sum = cx.var(x[1]);
+        each!(cx, r in *list, {
+            let more = cx.get(&sum) + cx.load(TABLE, r, 0);
+            cx.set(&mut sum, more);
+        });
+        let (first, end) = (cx.at(0), cx.at(ROWS));
+        span!(cx, k in first, end, {
+            span!(cx, r in first, k, {
+                let entry = cx.load(TABLE, k, 0) * x[0] + cx.load(TABLE, k, 2);
+                let sum = cx.load(TABLE, r, 1) + entry;
+                cx.store(TABLE, r, 1, sum);
+            });
+        });
+        vec![cx.get(&sum)]
+    };
+    let shared = |parts: &Split| texts(parts).matches("+= 8u").count();
+    let (mut expected, alone) = (memory(ROWS), kernels(&recorded(1, code), 100_000));
+    evaluated(&alone, [0.5, 0.0], &mut expected);
+    let parts = kernels(&recorded(8, code), 100_000);
+    let mut got = memory(ROWS);
+    evaluated(&parts, [0.5, 0.0], &mut got);
+    assert_eq!(got, expected);
+    assert_eq!(shared(&parts), 2);
+}
+
 /// Asserts that no loop of it is shared, and that it gives the bits of one lane.
 #[track_caller]
 fn assert_alone(code: fn(&mut Recorder, &List, &[Recorded]) -> Vec<Recorded>) {
