@@ -27,8 +27,8 @@ pub mod side {
     pub const SIDE: usize = 0;
     /// The solution.
     pub const SOLUTION: usize = 1;
-    /// The entry in the column that is eliminated, 0 up to the dof of that column; of the part of that dof alone.
-    pub const COLUMN: usize = 2;
+    /// The inverse of its pivot.
+    pub const PIVOT: usize = 2;
     /// Columns: a vector, since lanes write rows of their own.
     pub const COLUMNS: usize = 4;
 }
@@ -41,8 +41,10 @@ pub mod of_dof {
     pub const FIRST: usize = 1;
     /// What follows the last one.
     pub const END: usize = 2;
+    /// In row k, the dof behind k.
+    pub const NEXT: usize = 3;
     /// Columns.
-    pub const COLUMNS: usize = 3;
+    pub const COLUMNS: usize = 4;
 }
 
 /// Columns of [`RolledSystem::places`].
@@ -81,7 +83,7 @@ impl RolledSystem {
         };
         for part in pattern.parts() {
             for dof in part.clone() {
-                let row = [dofs - 1 - dof, part.start, part.end];
+                let row = [dofs - 1 - dof, part.start, part.end, dof + 1];
                 t.tables.indices.extend(row.map(|index| index as u32));
             }
         }

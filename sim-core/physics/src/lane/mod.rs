@@ -271,8 +271,6 @@ pub trait Cx: Sized {
     /// Does a backend wait long for what it loads, and is its code recorded? Then loads that do not depend on each other stand
     /// together.
     const GATHERS_LOADS: bool = false;
-    /// Does the solver add stiff contacts to a factor? Recorded code would be longer, and is without.
-    const UPDATES_FACTORS: bool = true;
     /// May a class of contacts have several trees, and may the solver loop over a large system ([`crate::constants::rolled`])? Only
     /// recorded code has to be short for such models.
     const TAKES_HEAPS: bool = false;
@@ -299,6 +297,12 @@ pub trait Cx: Sized {
         for (value, cell) in values.iter_mut().zip(cells) {
             *value = self.get(cell);
         }
+    }
+
+    /// Does the solver add stiff contacts to a factor? Recorded code is longer with it, and has it where it is asked for.
+    #[inline(always)]
+    fn updates_factors(&self) -> bool {
+        true
     }
 
     /// Threads that share the work of a world, a power of two: its *lanes*. They all run the same code, and a value is the same in

@@ -45,7 +45,6 @@ impl Cx for Recorder {
     type List = RecordedList;
 
     const GATHERS_LOADS: bool = true;
-    const UPDATES_FACTORS: bool = false;
     const TAKES_HEAPS: bool = true;
 
     #[track_caller]
@@ -99,6 +98,11 @@ impl Cx for Recorder {
             });
             false
         })
+    }
+
+    #[track_caller]
+    fn updates_factors(&self) -> bool {
+        with(Location::caller(), |s| s.updates_factors)
     }
 
     #[track_caller]

@@ -19,6 +19,12 @@ impl Recorder {
         with(Location::caller(), |s| s.lanes = lanes);
     }
 
+    /// Has the solver add stiff contacts to factors, as on the CPU. Call it before code of the solver.
+    #[track_caller]
+    pub fn update_factors(&mut self) {
+        with(Location::caller(), |s| s.updates_factors = true);
+    }
+
     /// What is recorded from now on belongs to this part of the code, such as a stage: see [`Origin`](crate::Origin).
     #[track_caller]
     pub fn begin_part(&mut self, name: &'static str) {

@@ -59,6 +59,8 @@ pub(crate) struct State {
     recording: u32,
     /// Threads per world.
     pub lanes: usize,
+    /// Whether stiff contacts are added to factors.
+    pub updates_factors: bool,
     /// Is what the code asks about some world taken to hold in none?
     pub assumes: bool,
     /// The mask that must hold nowhere, so far.
@@ -91,6 +93,7 @@ impl Session {
         let mut state = State {
             recording: RECORDINGS.fetch_add(1, Ordering::Relaxed),
             lanes: 1,
+            updates_factors: false,
             assumes: false,
             assumed: None,
             values: Vec::new(),

@@ -80,7 +80,7 @@ pub(super) fn solve_system<C: Cx, const TURNS: bool>(
     {
         return solve_rolled::<_, TURNS>(cx, m, b, x, tables);
     }
-    let stiff_touching = touching.filter(|_| updates::may_be_stiff::<C>(&m.contacts));
+    let stiff_touching = touching.filter(|_| updates::may_be_stiff(cx, &m.contacts));
     let target = x.target();
     // worlds whose matrix turns out to have lost M solve once more, from M and the rows of joints
     if stiff_touching.is_some() {
@@ -110,6 +110,7 @@ fn solve_rolled<C: Cx, const TURNS: bool>(
         pattern: &m.pattern,
         mass: &w.mass_matrix,
         with_joints: &w.hessian,
+        asks_for_stiffness: asks_for_stiffness(m),
     };
     match x {
         Unknown::Minimum(hold) => {
@@ -232,6 +233,13 @@ pub(super) fn widen<C: Cx>(cx: &mut C, places: &[usize], smaller: &[C::V], large
     }
 }
 
+/// Is the ratio of H(j,j) and M(j,j) of use? It scales the rounding of the step, which inverse dynamics corrects if the model has
+/// refinements; it also tells whether H has lost M.
+#[inline(always)]
+fn asks_for_stiffness<R: Real>(m: &Constants<R>) -> bool {
+    !R::DOUBLE && (m.solver.refinements == 0 || m.contacts.are_stiff)
+}
+
 /// The largest ratio of diagonal entries of H and M; 1 where it is of no use.
 #[inline(always)]
 fn stiffening_of<F: Num>(
@@ -241,9 +249,7 @@ fn stiffening_of<F: Num>(
     mass_matrix: &[F],
 ) -> F {
     let mut largest = F::c(1.0);
-    // H(j,j) / M(j,j) scales the rounding of the step, which inverse dynamics corrects if the model has refinements; it also tells
-    // whether H has lost M
-    if !F::Real::DOUBLE && (m.solver.refinements == 0 || m.contacts.are_stiff) {
+    if asks_for_stiffness(m) {
         for j in 0..m.dofs.len() {
             let ratio = hessian[pattern.at(j, j)].div(mass_matrix[m.pattern.at(j, j)]);
             largest = ratio.max(largest);

@@ -35,7 +35,7 @@
 //! the minimum is followed by one more, unless that could gain less than the tolerance (see [`Progress::plan`]).
 //!
 //! Stiffer contacts leave no digit of M in the sum M + Jᵀ W J. In worlds with such a sum, contacts are added to the factor of M
-//! ([`updates`]). Backends that record code are without ([`Cx::UPDATES_FACTORS`]).
+//! ([`updates`]). Backends that record code are without unless they are asked for them ([`Cx::updates_factors`]).
 //!
 //! Where the mass matrix loses too many digits in `f32`, [`refine`] corrects the accelerations by inverse dynamics.
 //!

@@ -1,13 +1,14 @@
 //! The system of an iteration where a model has many dofs: loops over a matrix in scratch memory.
 //!
 //! ```text
-//! for k rising:    A(i, j) -= A(i, k) A(j, k) / D(k)     y(i) -= A(i, k) y(k) / D(k)      of all k < j <= i
-//! for k falling:   x(k) = y(k) / D(k)                    y(i) -= A(k, i) x(k)             of all i < k
+//! for k falling:   L(k, i) = A(k, i) / D(k)     A(i, j) -= L(k, i) A(k, j)     y(i) -= L(k, i) y(k)     of all j <= i < k
+//! for k rising:    x(i) -= L(i, k) x(k)                                                                 of all i > k
 //! ```
 //!
-//! That is A = L D Lᵀ with L D below the diagonal. Each loop over dofs writes rows of its own, so the lanes of a world share it. Column k
-//! is copied before the rows behind it change: all of them read it. Rows are of the part of the system that k is of. A row is updated a
-//! few columns at a time, and those that are done or right of the diagonal are skipped.
+//! That is A = Lᵀ D L as in [`crate::math::factor`], and x begins as y / D. A tree makes no fill, and rows whose entry is 0 are skipped.
+//! Every number has the operations of the unrolled code in its order, so bits are the same where one thread has a world, but for the signs
+//! of zeros. Each loop over dofs writes rows of its own, so the lanes of a world share it. Rows are of the part of the system that k is
+//! of. A row is updated a few columns at a time, and those right of the diagonal are skipped.
 
 use super::contacts::{ClassOf, ContactsOf, block_of, law_held};
 use super::hold::Hold;
@@ -32,6 +33,8 @@ pub(super) struct Rolled<'a, C: Cx> {
     pub mass: &'a [C::F],
     /// M and Jᵀ W J of the rows of joints, packed as M.
     pub with_joints: &'a [C::F],
+    /// Whether it is asked how stiff contacts make the matrix.
+    pub asks_for_stiffness: bool,
 }
 
 impl<C: Cx> Rolled<'_, C> {
@@ -46,10 +49,13 @@ impl<C: Cx> Rolled<'_, C> {
         pull: Option<&mut [C::V]>,
         hold: Option<Hold<C>>,
     ) -> C::F {
-        // M and the rows of joints, then contacts, class after class
+        // M and the rows of joints, then contacts, class after class: first those whose entries lie in M's pattern
         self.begin(cx, vector);
-        for class in 0..self.contacts.classes.len() {
-            self.add_class::<TURNS>(cx, class, pull.is_some(), hold);
+        for couples in [false, true] {
+            let classes = self.contacts.classes.iter().enumerate();
+            for (class, _) in classes.filter(|(_, class)| class.couples == couples) {
+                self.add_class::<TURNS>(cx, class, pull.is_some(), hold);
+            }
         }
         // how stiff the matrix is, while its diagonal is there
         let ratio = self.stiffening(cx);
@@ -59,13 +65,13 @@ impl<C: Cx> Rolled<'_, C> {
             let x = cx.load(self.tables.sides, row, side::SIDE);
             cx.put(pull, x);
         }
-        // A = L D Lᵀ and y, then x
+        // A = Lᵀ D L and y, then x
         self.eliminate(cx);
         self.substitute(cx);
-        // every thread of the world gets all of it
+        // every thread of the world gets all of it, zeros with a sign of their own
         for (dof, x) in vector.iter_mut().enumerate() {
             let row = cx.at(dof);
-            *x = cx.load(self.tables.sides, row, side::SOLUTION);
+            *x = cx.load(self.tables.sides, row, side::SOLUTION) + C::F::c(0.0);
         }
         ratio
     }
@@ -73,14 +79,6 @@ impl<C: Cx> Rolled<'_, C> {
     /// The first dof, and what follows the last.
     fn bounds(&self, cx: &C) -> [C::I; 2] {
         [cx.at(0), cx.at(self.tables.matrix.rows)]
-    }
-
-    /// The first dof of the part that a dof is of, and what follows the last.
-    fn part(&self, cx: &mut C, dof: C::I) -> [C::I; 2] {
-        let (of_dofs, size) = (self.tables.of_dofs, self.tables.matrix.rows);
-        let first = cx.index(of_dofs, dof, of_dof::FIRST, size);
-        let end = cx.index(of_dofs, dof, of_dof::END, size + 1);
-        [first, end]
     }
 
     /// Writes the matrix and the right-hand side without contacts.
@@ -127,10 +125,12 @@ impl<C: Cx> Rolled<'_, C> {
                 // where its column begins; a sum for each column of the class, and one for the right-hand side
                 let at = cx.constant(places, i, place::FIRST);
                 let mut sums: Vec<C::V> = Vec::new();
-                for _ in &class.columns {
-                    sums.push(cx.var(C::F::c(0.0)));
+                for column in &class.columns {
+                    let x = cx.load(matrix, i, column.dof);
+                    sums.push(cx.var(x));
                 }
-                let mut push = cx.var(C::F::c(0.0));
+                let x = cx.load(sides, i, side::SIDE);
+                let mut push = cx.var(x);
                 each!(cx, r in list, {
                     // a contact of other bodies does not have the dof: its J(c) is 0
                     let here = self.column_at::<TURNS>(cx, class, r, at);
@@ -139,7 +139,7 @@ impl<C: Cx> Rolled<'_, C> {
                         size = size + x.abs();
                     }
                     when!(cx, C::F::c(0.0).lt(size), {
-                        let (stiff, along) = self.pushed::<TURNS>(cx, class, r, here, hold);
+                        let (stiff, force) = self.pushed::<TURNS>(cx, class, r, here, hold);
                         // J(c)ᵀ W J of this dof, for all columns c
                         for (c, sum) in sums.iter_mut().enumerate() {
                             let column = self.column::<TURNS>(cx, class, r, c);
@@ -150,17 +150,20 @@ impl<C: Cx> Rolled<'_, C> {
                             cx.put(sum, x);
                         }
                         // Jᵀ f of this dof
-                        let x = cx.get(&push) + along;
+                        let mut x = cx.get(&push);
+                        for (a, f) in here.into_iter().zip(force) {
+                            x = a.fma(f, x);
+                        }
                         cx.put(&mut push, x);
                     });
                 });
                 // each lane writes the rows of its dofs; what lies right of the diagonal is not used
                 for (column, sum) in class.columns.iter().zip(&sums) {
-                    let x = cx.load(matrix, i, column.dof) + cx.get(sum);
+                    let x = cx.get(sum);
                     cx.fill(matrix, i, column.dof, x);
                 }
                 if pulls {
-                    let x = cx.load(sides, i, side::SIDE) + cx.get(&push);
+                    let x = cx.get(&push);
                     cx.fill(sides, i, side::SIDE, x);
                 }
             });
@@ -224,7 +227,7 @@ impl<C: Cx> Rolled<'_, C> {
         column
     }
 
-    /// W J(c) and J(c) · f of a contact with this column.
+    /// W J(c) of a contact with this column, and f.
     fn pushed<const TURNS: bool>(
         &self,
         cx: &mut C,
@@ -232,7 +235,7 @@ impl<C: Cx> Rolled<'_, C> {
         r: C::I,
         column: [C::F; 6],
         hold: Option<Hold<C>>,
-    ) -> ([C::F; 6], C::F) {
+    ) -> ([C::F; 6], [C::F; 6]) {
         let (t, zero) = (self.contacts, C::F::c(0.0));
         // held contacts stick in the model, wherever they are
         let holds = hold.map(|hold| hold.of_contact(cx, t, r));
@@ -240,27 +243,29 @@ impl<C: Cx> Rolled<'_, C> {
         if let Some(block) = block_of::<_, TURNS>(class) {
             let jar = turning::six(cx, t, r, row::JAR, block + more::JAR);
             let law = turning::law_at(cx, t, r, block, jar, holds);
-            return (law.times(column), turning::dot(column, law.force));
+            return (law.times(column), law.force);
         }
         // W and f of normal and tangents
         let jar = cx.load3(t.memory.rows, r, row::JAR);
         let law = law_held(cx, t, r, jar, holds);
         let [nn, nx, ny, xx, xy, yy] = law.stiffness;
         let weight = [[nn, nx, ny], [nx, xx, xy], [ny, xy, yy]];
-        let (mut stiff, mut along) = ([zero; 6], zero);
-        // W J(c), and J(c) · f
+        let (mut stiff, mut force) = ([zero; 6], [zero; 6]);
+        // W J(c), summed as `assembly` does
         for i in 0..3 {
-            for j in 0..3 {
-                stiff[i] = weight[i][j].fma(column[j], stiff[i]);
-            }
-            along = column[i].fma(law.force[i], along);
+            let along = weight[i][1].fma(column[1], weight[i][2] * column[2]);
+            stiff[i] = weight[i][0].fma(column[0], along);
+            force[i] = law.force[i];
         }
-        (stiff, along)
+        (stiff, force)
     }
 
-    /// The largest ratio of diagonal entries of the matrix and M.
+    /// The largest ratio of diagonal entries of the matrix and M; 1 where that is of no use.
     fn stiffening(&self, cx: &mut C) -> C::F {
         let mut largest = C::F::c(1.0);
+        if !self.asks_for_stiffness {
+            return largest;
+        }
         // as `linear::stiffening_of`: it scales the rounding of the step
         for dof in 0..self.tables.matrix.rows {
             let row = cx.at(dof);
@@ -273,42 +278,42 @@ impl<C: Cx> Rolled<'_, C> {
 
     /// Leaves L D below the diagonal, D on it, and y.
     fn eliminate(&self, cx: &mut C) {
-        let RolledSystem { matrix, sides, .. } = self.tables;
-        let zero = C::F::c(0.0);
+        let RolledSystem {
+            matrix,
+            sides,
+            of_dofs,
+            ..
+        } = self.tables;
         let [begin, stop] = self.bounds(cx);
-        span!(cx, k in begin, stop, {
-            let [first, end] = self.part(cx, k);
+        span!(cx, before in begin, stop, {
+            let k = cx.index(of_dofs, before, of_dof::BACKWARDS, matrix.rows);
+            let first = cx.index(of_dofs, k, of_dof::FIRST, matrix.rows);
             let dof = cx.number(k);
-            // 1 / D(k), and y(k) / D(k)
+            // 1 / D(k), and y(k)
             let pivot = inverse(cx.load_at(matrix, k, 0, dof));
-            let known = cx.load(sides, k, side::SIDE) * pivot;
-            // column k for all lanes, 0 up to k; then what y(k) takes from the rows behind it
-            span!(cx, i in first, end, {
-                let below = dof.lt(cx.number(i));
-                let entry = cx.load_at(matrix, i, 0, dof);
-                cx.fill(sides, i, side::COLUMN, C::F::select(below, entry, zero));
-                when!(cx, below, {
-                    let y = cx.load(sides, i, side::SIDE);
-                    cx.fill(sides, i, side::SIDE, entry.fnma(known, y));
-                });
-            });
-            // the rows behind k, in columns that some row still needs
-            span!(cx, i in first, end, {
+            let known = cx.load(sides, k, side::SIDE);
+            // the rows before k, in columns up to their own; all of them read row k
+            span!(cx, i in first, k, {
                 let number = cx.number(i);
-                when!(cx, dof.lt(number), {
-                    let scale = cx.load(sides, i, side::COLUMN) * pivot;
-                    // columns from k + 1 to i lie in some of the groups
+                let entry = cx.load_at(matrix, k, 0, number);
+                // other branches of a tree have 0 there
+                when!(cx, C::F::c(0.0).lt(entry.abs()), {
+                    let share = entry * pivot;
+                    let y = cx.load(sides, i, side::SIDE);
+                    cx.fill(sides, i, side::SIDE, known.fnma(share, y));
+                    // columns up to i lie in some of the groups
                     for from in (0..matrix.rows).step_by(TOGETHER) {
                         let to = matrix.rows.min(from + TOGETHER);
-                        let behind = dof.lt(C::F::c((to - 1) as f64));
-                        let below = C::F::c(from as f64 - 0.5).lt(number);
-                        when!(cx, behind & below, {
-                            // columns of the part up to k have 0 here, and stay; nothing reads those of other parts
+                        when!(cx, C::F::c(from as f64 - 0.5).lt(number), {
+                            // columns of other parts have 0 in row k, and stay; all are read first, as vectors
+                            let mut entries = Vec::new();
                             for j in from..to {
-                                let of_column = cx.at(j);
-                                let entry = cx.load(sides, of_column, side::COLUMN);
+                                let other = cx.load(matrix, k, j);
                                 let x = cx.load(matrix, i, j);
-                                cx.fill(matrix, i, j, scale.fnma(entry, x));
+                                entries.push(share.fnma(other, x));
+                            }
+                            for (x, j) in entries.into_iter().zip(from..to) {
+                                cx.fill(matrix, i, j, x);
                             }
                         });
                     }
@@ -326,22 +331,24 @@ impl<C: Cx> Rolled<'_, C> {
             ..
         } = self.tables;
         let [begin, stop] = self.bounds(cx);
-        span!(cx, before in begin, stop, {
-            let k = cx.index(of_dofs, before, of_dof::BACKWARDS, matrix.rows);
-            let [first, end] = self.part(cx, k);
+        // y / D, and 1 / D, which each row needs again
+        span!(cx, i in begin, stop, {
+            let number = cx.number(i);
+            let pivot = inverse(cx.load_at(matrix, i, 0, number));
+            let x = cx.load(sides, i, side::SIDE) * pivot;
+            cx.fill(sides, i, side::SOLUTION, x);
+            cx.fill(sides, i, side::PIVOT, pivot);
+        });
+        span!(cx, k in begin, stop, {
+            // x(k) is known; what it adds to the rows behind it
+            let x = cx.load(sides, k, side::SOLUTION);
             let dof = cx.number(k);
-            // all that is known of x(k) has left y(k)
-            let pivot = inverse(cx.load_at(matrix, k, 0, dof));
-            let x = cx.load(sides, k, side::SIDE) * pivot;
-            cx.fill(sides, k, side::SOLUTION, x);
-            // what it adds to the rows before it
-            span!(cx, i in first, end, {
-                let number = cx.number(i);
-                when!(cx, number.lt(dof), {
-                    let entry = cx.load_at(matrix, k, 0, number);
-                    let y = cx.load(sides, i, side::SIDE);
-                    cx.fill(sides, i, side::SIDE, entry.fnma(x, y));
-                });
+            let next = cx.index(of_dofs, k, of_dof::NEXT, matrix.rows + 1);
+            let end = cx.index(of_dofs, k, of_dof::END, matrix.rows + 1);
+            span!(cx, i in next, end, {
+                let share = cx.load_at(matrix, i, 0, dof) * cx.load(sides, i, side::PIVOT);
+                let other = cx.load(sides, i, side::SOLUTION);
+                cx.fill(sides, i, side::SOLUTION, share.fnma(x, other));
             });
         });
     }

@@ -42,12 +42,9 @@ pub(in crate::backend::gpu) fn check_software(m: &Constants<f32>) -> Result<(), 
     }
     let pattern = pattern(m);
     let dofs = m.dofs.len();
-    // a program may have the loops over contacts, those that eliminate, and those that substitute
-    let parts: usize = pattern
-        .parts()
-        .map(|part| part.len() * (2 + 3 * part.len()))
-        .sum();
-    let rounds = dofs * (2 + m.contacts.contacts_max) + parts;
+    // a program may have the loops over contacts, one for each class, and those that eliminate and substitute, over half of a part each
+    let parts: usize = pattern.parts().map(|part| part.len() * part.len()).sum();
+    let rounds = dofs * (4 + m.contacts.classes.len() + m.contacts.contacts_max) + parts;
     match rounds <= SOFTWARE_ROUNDS {
         true => Ok(()),
         false => Err(BackendError::Program {

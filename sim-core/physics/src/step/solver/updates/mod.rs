@@ -35,8 +35,8 @@ const STIFFENING_MAX: f64 = 3e5;
 
 /// May a world's contacts be stiffer? In `f64`, the reference, none are.
 #[inline(always)]
-pub(super) fn may_be_stiff<C: Cx>(t: &ContactsOf<C>) -> bool {
-    C::UPDATES_FACTORS && !<<C::F as Num>::Real as Real>::DOUBLE && t.are_stiff
+pub(super) fn may_be_stiff<C: Cx>(cx: &C, t: &ContactsOf<C>) -> bool {
+    cx.updates_factors() && !<<C::F as Num>::Real as Real>::DOUBLE && t.are_stiff
 }
 
 /// Solves the system of an iteration once more in the touching worlds whose H is too stiff beside M, and replaces the solution there.
