@@ -14,18 +14,11 @@ const FRAMES: [usize; 2] = [1, 5];
 /// a driver need not be the nearest numbers.
 const FIRST_MAX: f32 = 1e-6;
 
-/// Prints how far worlds are from those of the CPU, and how many have the same bits.
+/// Prints how far worlds are from those of the CPU, and how many numbers have the same bits.
 pub fn follows_cpu(place: &Place, plan: &Plan) -> anyhow::Result<()> {
-    let crowd = WorldSet::all(WORLDS);
-    let gpu = states(plan, &crowd, &options(place, WORLDS, &SHOWN))?;
-    let on_cpu = Options {
-        device: Device::Cpu,
-        ..options(place, WORLDS, &SHOWN)
-    };
-    let cpu = states(plan, &crowd, &on_cpu)?;
     let coords = plan.model.coords() * WORLDS;
     let mut first = 0.0_f32;
-    for (frames, (gpu, cpu)) in FRAMES.iter().zip(gpu.iter().zip(&cpu)) {
+    for (frames, [gpu, cpu]) in FRAMES.iter().zip(both(place, plan)?) {
         let apart = |range: std::ops::Range<usize>| {
             let both = gpu[range.clone()].iter().zip(&cpu[range]);
             let largest = |most: f32, (a, b): (&f32, &f32)| match (a - b).abs() {
@@ -39,14 +32,10 @@ pub fn follows_cpu(place: &Place, plan: &Plan) -> anyhow::Result<()> {
         if *frames == 1 {
             first = positions;
         }
-        let equal = gpu
-            .iter()
-            .zip(cpu)
-            .filter(|(a, b)| a.to_bits() == b.to_bits());
         println!(
             "{}: after {frames} frames within {positions:.1e} of the CPU (velocities {velocities:.1e}); {:.1} % of the numbers have the same bits",
             plan.scene.name(),
-            100.0 * equal.count() as f64 / gpu.len() as f64
+            100.0 * (gpu.len() - differ(&gpu, &cpu)) as f64 / gpu.len() as f64
         );
     }
     ensure!(
@@ -55,6 +44,38 @@ pub fn follows_cpu(place: &Place, plan: &Plan) -> anyhow::Result<()> {
         plan.scene.name()
     );
     Ok(())
+}
+
+/// Compares all numbers with those of the CPU.
+pub fn has_cpu_bits(place: &Place, plan: &Plan) -> anyhow::Result<()> {
+    let name = plan.scene.name();
+    for (frames, [gpu, cpu]) in FRAMES.iter().zip(both(place, plan)?) {
+        let (wrong, all) = (differ(&gpu, &cpu), gpu.len());
+        ensure!(
+            wrong == 0,
+            "{name}: {wrong} of {all} numbers differ from the CPU's after {frames} frames"
+        );
+        println!("{name}: after {frames} frames all {all} numbers are the CPU's");
+    }
+    Ok(())
+}
+
+/// How many numbers have other bits.
+fn differ(some: &[f32], others: &[f32]) -> usize {
+    let both = some.iter().zip(others);
+    both.filter(|(a, b)| a.to_bits() != b.to_bits()).count()
+}
+
+/// The states on the adapter and on the CPU, after each number of frames.
+fn both(place: &Place, plan: &Plan) -> anyhow::Result<Vec<[Vec<f32>; 2]>> {
+    let crowd = WorldSet::all(WORLDS);
+    let gpu = states(plan, &crowd, &options(place, WORLDS, &SHOWN))?;
+    let on_cpu = Options {
+        device: Device::Cpu,
+        ..options(place, WORLDS, &SHOWN)
+    };
+    let cpu = states(plan, &crowd, &on_cpu)?;
+    Ok(gpu.into_iter().zip(cpu).map(|(a, b)| [a, b]).collect())
 }
 
 /// Positions, then velocities, of all worlds after some frames.

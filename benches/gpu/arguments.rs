@@ -78,6 +78,9 @@ pub struct Arguments {
     /// Threads that share a world where contacts can be; else what suits the adapter.
     #[arg(long)]
     pub world_threads: Option<usize>,
+    /// Worlds have the bits that they have on the CPU; the checks then compare all numbers with the CPU's.
+    #[arg(long)]
+    pub cpu_bits: bool,
     /// Largest kernel, in simple statements; else what suits the adapter.
     #[arg(long)]
     pub kernel_size: Option<usize>,

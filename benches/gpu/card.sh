@@ -8,7 +8,8 @@
 # What this machine cannot measure, such as tensors without torch, is no failure: its result has the reason.
 #
 # stage                                              at most [s]   result
-#   1  results beside MuJoCo; bits for 1 to 65,536 worlds    420   log.txt
+#   1  results beside MuJoCo; bits for 1 to 65,536 worlds;   420   log.txt
+#      the bits of the CPU
 #   2  speed of all scenes, commands to arrays; energy       900   speed.csv
 #   3  threads per world, cuts of kernels                    240   splits.csv
 #   4  tensors without copies                                 90   tensors.csv
@@ -46,13 +47,15 @@ done
 scenes="torque_free target grasp standing quadruped$models"
 counts="4096 8192 16384 1024 65536" peer_counts="8192 4096 16384" checks=4096,65536 timed_worlds=4096,16384 seconds=1 tensors=()
 split_scenes="grasp standing" split_worlds="4096"
-ways=("" "--world-threads 1" "--world-threads 4" "--world-threads 16" "--kernel-size 12000" "--kernel-size 3000"
+bits_scenes="torque_free grasp standing"
+[ -e "$here/scenes/g1_flat.toml" ] && bits_scenes="$bits_scenes g1_flat"
+ways=("" "--cpu-bits" "--world-threads 1" "--world-threads 4" "--world-threads 16" "--kernel-size 12000" "--kernel-size 3000"
   "--dispatch-price 5000" "--dispatch-price 500" "--world-threads 32" "--kernel-size 24000")
 if [ -n "${CARD_QUICK:-}" ]; then
   models=""
   [ -e "$here/scenes/tiny.toml" ] && models=" tiny"
   scenes="torque_free$models" counts="64 1024" peer_counts="64" checks=16,64 timed_worlds=64 seconds=0.05 tensors=(--worlds 64 --frames 20)
-  split_scenes="torque_free" split_worlds="64" ways=("" "--world-threads 4" "--kernel-size 3000")
+  split_scenes="torque_free" split_worlds="64" ways=("" "--cpu-bits" "--kernel-size 3000") bits_scenes="torque_free"
 fi
 
 say() { printf '%s\n' "$@" | tee -a "$log"; }
@@ -215,7 +218,10 @@ python_piece() {
   fi
 }
 
-stage_1() { for scene in $scenes; do gpu "1/$scene" --checks only --scenes "$(as_file "$scene")" --check-worlds "$checks"; done; }
+stage_1() {
+  for scene in $scenes; do gpu "1/$scene" --checks only --scenes "$(as_file "$scene")" --check-worlds "$checks"; done
+  for scene in $bits_scenes; do gpu "1/bits-$scene" --checks only --cpu-bits --scenes "$(as_file "$scene")" --check-worlds 64; done
+}
 
 measured() { gpu "$1" --checks skip --brief --side "$2" --scenes "$(as_file "$3")" --worlds "$4" --seconds "$seconds" --append "${@:5}"; }
 

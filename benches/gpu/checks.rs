@@ -26,9 +26,13 @@ pub const SHOWN: [Field; 2] = [Field::JointQ, Field::JointQd];
 pub fn check(place: &Place, arguments: &Arguments) -> anyhow::Result<()> {
     for scene in &arguments.scenes {
         let plan = arguments.plan(scene)?;
+        if place.cpu_bits {
+            agreement::has_cpu_bits(place, &plan)?;
+        }
         match scene {
             Scene::Target => follows_target(place, &plan)?,
             Scene::Grasp => follows_grasp(place, &plan)?,
+            _ if place.cpu_bits => {}
             Scene::File(_) => agreement::follows_cpu(place, &plan)?,
             _ => {}
         }

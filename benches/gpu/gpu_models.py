@@ -1,12 +1,14 @@
-"""MuJoCo models on a GPU beside the CPU, with one and with eight threads per world.
+"""MuJoCo models on a GPU beside the CPU: with the bits of the CPU, and with eight threads per world.
 
     make gpu-models               # brings the models first
-    python -m benches gpu_models --models g1_flat,ant --world-threads 8
+    python -m benches gpu_models --models g1_flat,ant --ways 1,8
 
 For each model of mujoco_robots.py it runs the checks of `gpu_bench`: 16 worlds on both for five frames, then the same
-worlds among 1 and 7 others. It prints how far positions and velocities are apart, and how many numbers have the same
-bits. Exit code 1 means that positions differ by more than 1e-6 after a frame, that bits depend on the number of
-worlds, that a model does not start, or that there is none. Mesa's software driver takes about half an hour.
+worlds among 1 and 7 others. The way `cpu-bits` asks for the bits of the CPU, and compares all numbers. A number is one
+of threads per world: it prints how far positions and velocities are apart, and how many numbers have the same bits.
+Exit code 1 means that a number has other bits than on the CPU, that positions differ by more than 1e-6 after a frame,
+that bits depend on the number of worlds, that a model does not start, or that there is none. Mesa's software driver
+takes about half an hour.
 """
 
 from __future__ import annotations
@@ -31,11 +33,11 @@ SLOW = ("three_humanoids",)
 PATIENCE = 1200.0  # [s]
 
 
-def check(scene: Path, threads: str) -> bool:
+def check(scene: Path, way: str) -> bool:
     """Runs the checks of a scene, and prints their results."""
-    command = [BINARY, "--checks", "only", "--scenes", scene, "--world-threads", threads]
-    command += ["--check-worlds", str(CHECK_WORLDS)]
-    print(f"== {scene.stem}, {threads} threads per world", flush=True)
+    command = [BINARY, "--checks", "only", "--scenes", scene, "--check-worlds", str(CHECK_WORLDS)]
+    command += ["--cpu-bits"] if way == "cpu-bits" else ["--world-threads", way]
+    print(f"== {scene.stem}, {way if way == 'cpu-bits' else f'{way} threads per world'}", flush=True)
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
@@ -53,7 +55,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="MuJoCo models on a GPU beside the CPU.")
     parser.add_argument("--reference", type=Path, default=REFERENCE, help="folder of models that no wheel has")
     parser.add_argument("--models", help="names of some, as card_scenes.py writes them")
-    parser.add_argument("--world-threads", default="1,8", help="threads per world")
+    parser.add_argument("--ways", default="cpu-bits,8", help="cpu-bits, and numbers of threads per world")
     arguments = parser.parse_args()
     failed = []
     with tempfile.TemporaryDirectory() as folder:
@@ -66,9 +68,7 @@ def main() -> int:
             return 1
         for name in wanted:
             scene = known[name]
-            failed += [
-                f"{name} ({threads})" for threads in arguments.world_threads.split(",") if not check(scene, threads)
-            ]
+            failed += [f"{name} ({way})" for way in arguments.ways.split(",") if not check(scene, way)]
     print(f"failed: {', '.join(failed)}" if failed else "all agree")
     return int(bool(failed))
 

@@ -44,6 +44,7 @@ pub struct Place {
     cache: PathBuf,
     replay: Replay,
     world_threads: Option<usize>,
+    cpu_bits: bool,
     cuts: Cuts,
 }
 
@@ -55,6 +56,7 @@ impl Place {
             cache: cache.to_owned(),
             replay: Replay::Recorded,
             world_threads: arguments.world_threads,
+            cpu_bits: arguments.cpu_bits,
             cuts: arguments.cuts(),
         }
     }
@@ -70,6 +72,7 @@ pub fn options(place: &Place, worlds: usize, fields: &[Field]) -> Options {
         },
         replay: place.replay,
         world_threads: place.world_threads,
+        cpu_bits: place.cpu_bits,
         cuts: place.cuts,
         fields: fields.to_vec(),
         ..Options::default()
@@ -128,6 +131,7 @@ fn run(arguments: &Arguments, info: &AdapterInfo, place: &Place) -> anyhow::Resu
                 dofs: plan.model.dofs(),
                 substeps: plan.model.substeps(),
                 world_threads: arguments.world_threads,
+                cpu_bits: place.cpu_bits,
                 cuts: place.cuts,
                 gpu,
                 cpu,

@@ -18,6 +18,8 @@ pub struct Row {
     pub substeps: usize,
     /// Threads per world and cuts that were asked for.
     pub world_threads: Option<usize>,
+    /// One thread per world, with the bits of the CPU.
+    pub cpu_bits: bool,
     pub cuts: Cuts,
     pub gpu: Option<GpuSide>,
     /// The processor's, on all cores.
@@ -81,7 +83,13 @@ impl Row {
             ("scene", self.scene.name().to_owned()),
             ("worlds", self.worlds.to_string()),
             ("dofs", self.dofs.to_string()),
-            ("world_threads", asked(self.world_threads)),
+            (
+                "world_threads",
+                match self.cpu_bits {
+                    true => "1 (cpu bits)".to_owned(),
+                    false => asked(self.world_threads),
+                },
+            ),
             ("kernel_size", asked(self.cuts.kernel)),
             ("dispatch_price", asked(self.cuts.dispatch)),
             ("kernels", count(&|gpu| gpu.in_step().count())),

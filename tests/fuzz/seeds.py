@@ -118,6 +118,7 @@ def description() -> None:
         "on_nan": "refuse",
         "draws": "world",
         "outputs_at": "frame",
+        "cpu_bits": False,
         "pace": {"realtime": 1.0, "period_ns": 1000, "late": "hold", "command_timeout_ns": None},
         "state_bytes": 64,
         "schema": 0,

@@ -10,8 +10,8 @@ use sim_physics::arrays::Field;
 use std::sync::Arc;
 
 const WORLDS: usize = 6;
-/// Largest difference of positions and velocities [m, rad, and per second]: dofs are eliminated in another order, and sums over contacts
-/// have zeros between. Stiff contacts multiply such a rounding by some thousand.
+/// Largest difference of positions and velocities [m, rad, and per second]: threads add in another order, and stiff contacts multiply such
+/// a rounding by some thousand.
 const WORST: f64 = 2e-4;
 /// Fastest spin at the start [rad/s]: forces of centres of mass beside their frames' origins count.
 const SPIN: f64 = 10.0;
@@ -23,9 +23,11 @@ const FIELDS: [Field; 4] = [
 ];
 
 /// Bodies in a row on the ground, each of which touches its neighbours; every third one has its centre of mass beside its frame's origin.
-fn row(bodies: usize, shape: &Shape) -> Arc<Model> {
+/// Friction is so many times as stiff as normals are.
+pub fn row(bodies: usize, shape: &Shape, impratio: f64) -> Arc<Model> {
     let mut scene = Description::new(1.0 / 240.0, 2);
     scene.solver.iterations = 100;
+    scene.solver.impratio = impratio;
     scene.add_ground("ground", 0.0);
     for k in 0..bodies {
         let place = Pose::at([0.098 * k as f64, 0.0, 0.049]);
@@ -38,12 +40,13 @@ fn row(bodies: usize, shape: &Shape) -> Arc<Model> {
     scene.compile().unwrap()
 }
 
-const BALL: Shape = Shape::Sphere { radius: 0.05 };
+pub const BALL: Shape = Shape::Sphere { radius: 0.05 };
 
-/// World k of a run starts as number `ids[k]`.
+/// World k of a run starts as number `ids[k]`. One thread per world computes the bits of the CPU.
 fn played(model: &Arc<Model>, device: Device, threads: usize, ids: &[usize], frames: usize) -> Run {
     let options = Options {
         world_threads: Some(threads),
+        cpu_bits: threads == 1,
         ..options(device, ids.len(), &FIELDS)
     };
     let mut run = Run::new(model, options);
@@ -72,12 +75,23 @@ fn state(run: &Run, world: usize) -> Vec<f64> {
         .collect()
 }
 
-fn assert_near_the_cpu(threads: usize) {
-    let model = row(9, &BALL);
+#[test]
+fn heaps_have_the_bits_of_the_cpu() {
+    let model = row(9, &BALL, 1.0);
+    let ids: Vec<usize> = (0..WORLDS).collect();
+    let [cpu, here] = [Device::Cpu, gpu()].map(|on| played(&model, on, 1, &ids, 20));
+    for world in ids {
+        assert_eq!(state(&here, world), state(&cpu, world), "world {world}");
+    }
+}
+
+#[test]
+fn heaps_of_several_threads_move_as_on_the_cpu() {
+    let model = row(9, &BALL, 1.0);
     let ids: Vec<usize> = (0..WORLDS).collect();
     for frames in [1, 20] {
         let cpu = played(&model, Device::Cpu, 1, &ids, frames);
-        let here = played(&model, gpu(), threads, &ids, frames);
+        let here = played(&model, gpu(), 8, &ids, frames);
         let mut worst = 0.0_f64;
         for world in ids.iter().copied() {
             let both = state(&here, world).into_iter().zip(state(&cpu, world));
@@ -88,18 +102,8 @@ fn assert_near_the_cpu(threads: usize) {
 }
 
 #[test]
-fn heaps_move_as_on_the_cpu() {
-    assert_near_the_cpu(1);
-}
-
-#[test]
-fn heaps_of_several_threads_move_as_on_the_cpu() {
-    assert_near_the_cpu(8);
-}
-
-#[test]
 fn a_heap_has_the_same_bits_among_any_number_of_worlds() {
-    let model = row(9, &BALL);
+    let model = row(9, &BALL, 1.0);
     let many: Vec<usize> = (0..70).collect();
     let all = played(&model, gpu(), 8, &many, 6);
     let few = [69, 3];
@@ -116,7 +120,7 @@ fn a_heap_has_the_same_bits_among_any_number_of_worlds() {
 #[test]
 fn what_a_heap_shows_is_what_the_cpu_shows() {
     // one thread evaluates what is shown, with loops over the system; stiff contacts make forces of differences
-    let model = row(9, &BALL);
+    let model = row(9, &BALL, 1.0);
     let fields = [Field::JointQdd, Field::BodyContactForce];
     let shown = |device| {
         let options = Options {
@@ -143,7 +147,7 @@ fn what_a_heap_shows_is_what_the_cpu_shows() {
 
 #[test]
 fn a_system_that_the_software_driver_would_leave_unsolved_is_refused() {
-    let model = row(25, &BALL);
+    let model = row(25, &BALL, 1.0);
     let refused = Simulation::new(model, &options(gpu(), 1, &FIELDS)).err();
     let text = refused.expect("its loops end early").to_string();
     assert!(
@@ -177,7 +181,7 @@ fn a_model_whose_kernels_would_be_too_long_is_refused_at_once() {
 fn kernels_of_a_heap_are_short() {
     // each may touch every other one: 465 kinds of contacts, and a system of 180 dofs
     let half_extents = [0.05; 3];
-    let model = row(30, &Shape::Box { half_extents });
+    let model = row(30, &Shape::Box { half_extents }, 1.0);
     assert_eq!(model.constants().contacts.classes.len(), 465);
     let layout = Simulation::layout_of(&model, &Options::default());
     let kernels = listing(&model, &layout, None).unwrap().kernels;

@@ -6,6 +6,7 @@ mod blocks;
 mod bookkeeping;
 #[path = "../common/mod.rs"]
 mod common;
+mod cpu_bits;
 mod delivery;
 mod heaps;
 #[path = "../common/imported_memory.rs"]

@@ -16,7 +16,7 @@ const WORLDS: usize = 6;
 const FIELDS: [Field; 2] = [Field::JointQ, Field::JointQd];
 
 /// A ball with four arms of three balls each, all of which may touch each other and the ground.
-fn ragdoll() -> Arc<Model> {
+pub fn ragdoll() -> Arc<Model> {
     let mut urdf = "<robot name=\"ragdoll\">".to_owned();
     let mut link = |name: &str, radius: f64| {
         let inertia = "ixx=\"2e-3\" iyy=\"2e-3\" izz=\"2e-3\" ixy=\"0\" ixz=\"0\" iyz=\"0\"";
@@ -64,7 +64,7 @@ fn ragdoll() -> Arc<Model> {
 }
 
 /// A MuJoCo model of the tests of stages.
-fn mujoco(name: &str) -> Arc<Model> {
+pub fn mujoco(name: &str) -> Arc<Model> {
     let folder = repo("sim-core/stages/recorded/tests/record_stages");
     let path = folder.join(name).with_extension("safetensors");
     let scene = Description::from_mujoco(path, MujocoOptions::named("every")).unwrap();

@@ -63,7 +63,7 @@ pub fn raft() -> Arc<Model> {
 }
 
 /// Lets rafts fall from these heights [m] and drives their paddles, with noise of this size [N·m]. `each` gets the run after each of
-/// the frames.
+/// the frames. Without a number of threads per world, they have the bits of the CPU.
 fn fall(
     model: &Arc<Model>,
     (device, threads): (Device, Option<usize>),
@@ -74,6 +74,7 @@ fn fall(
     let worlds = heights.len();
     let options = Options {
         world_threads: threads,
+        cpu_bits: threads.is_none(),
         ..options(device, worlds, &FIELDS)
     };
     let mut run = Run::new(model, options);
@@ -157,9 +158,13 @@ fn worlds_that_lack_room_are_those_that_have_it_from_the_start() {
 #[test]
 fn a_frame_that_is_repeated_has_its_commands_once() {
     let model = raft();
-    let [cpu, gpu] = [(Device::Cpu, None), (gpu(), Some(8))]
+    let [cpu, exact, gpu] = [(Device::Cpu, None), (gpu(), None), (gpu(), Some(8))]
         .map(|device| fall(&model, device, &HEIGHTS, (FRAMES, 0.5), |_| {}));
+    assert!(exact.sim.contact_room() > AT_START);
     for world in 0..HEIGHTS.len() {
+        for field in FIELDS {
+            assert_eq!(exact.get(field, world), cpu.get(field, world), "{field:?}");
+        }
         let [a, b] = [&cpu, &gpu].map(|run| run.get(Field::JointQ, world));
         for (k, (a, b)) in a.iter().zip(b).enumerate() {
             // a frame's noise or command too many turns the paddle by 3e-4 rad

@@ -52,6 +52,8 @@ pub struct AdapterInfo {
     pub subgroup_max: u32,
     /// Whether threads of a subgroup can read each other's values (`subgroupShuffle` and its relatives).
     pub shuffles: bool,
+    /// Whether programs may have floats of 64 bits.
+    pub doubles: bool,
     /// Whether host memory can be imported. In the list: the driver has the extension. Of an open device: a test import succeeded.
     pub imports: bool,
 }
@@ -172,6 +174,7 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
         shuffles: adapter
             .features()
             .contains(wgpu::Features::SUBGROUP | wgpu::Features::SUBGROUP_BARRIER),
+        doubles: adapter.features().contains(wgpu::Features::SHADER_F64),
         imports,
     }
 }

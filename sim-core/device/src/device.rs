@@ -66,10 +66,7 @@ impl Device {
             reason,
         };
         let wanted = wgpu::DeviceDescriptor {
-            required_features: match info.shuffles {
-                true => wgpu::Features::SUBGROUP | wgpu::Features::SUBGROUP_BARRIER,
-                false => wgpu::Features::empty(),
-            },
+            required_features: features(&info),
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
@@ -136,6 +133,15 @@ impl Device {
     pub fn lose(&self) {
         self.inner.wgpu.destroy();
     }
+}
+
+/// The features of wgpu that programs may need and the adapter has.
+fn features(info: &AdapterInfo) -> wgpu::Features {
+    let mut features = wgpu::Features::empty();
+    let shuffles = wgpu::Features::SUBGROUP | wgpu::Features::SUBGROUP_BARRIER;
+    features.set(shuffles, info.shuffles);
+    features.set(wgpu::Features::SHADER_F64, info.doubles);
+    features
 }
 
 impl Inner {

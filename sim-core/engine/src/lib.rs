@@ -9,6 +9,7 @@
 
 mod auto;
 pub mod backend;
+mod canonical;
 mod checks;
 mod command;
 pub mod dynamics;

@@ -63,6 +63,9 @@ pub struct Options {
     pub replay: Replay,
     /// Threads of a GPU that share a world where contacts can be, a power of two up to 32; none = what suits the adapter.
     pub world_threads: Option<usize>,
+    /// Whether frames have the same bits on the processor and on GPUs, in single precision: one thread per world, sums in the processor's
+    /// order, and every operation rounded to the nearest number. In frames zeros have no sign, and what is below 2^-126 is 0.
+    pub cpu_bits: bool,
     /// Where the kernels of a GPU are cut, where that differs from what suits the adapter; benchmarks vary it.
     pub cuts: Cuts,
     /// Limit on the compile time of a GPU program; a driver that exceeds it is abandoned.
@@ -98,6 +101,7 @@ impl Default for Options {
             device: Device::Cpu,
             replay: Replay::Recorded,
             world_threads: None,
+            cpu_bits: false,
             cuts: Cuts::default(),
             compile_limit: COMPILE_LIMIT,
             precision: Precision::F32,
@@ -171,6 +175,7 @@ pub(crate) fn backends(
             cache: cache.as_deref(),
             replay: options.replay,
             world_threads: options.world_threads,
+            cpu_bits: options.cpu_bits,
             cuts: options.cuts,
             compile_limit: options.compile_limit,
         };
@@ -237,7 +242,12 @@ pub(crate) fn backends(
 /// All that the rates of `auto` depend on, in one line.
 fn measured(model: &Model, options: &Options, groups: usize, adapter: &AdapterInfo) -> String {
     let (worlds, threads) = (options.worlds, threads_of(options));
-    let how = (options.replay, options.world_threads, options.cuts);
+    let how = (
+        options.replay,
+        options.world_threads,
+        options.cpu_bits,
+        options.cuts,
+    );
     format!(
         "tightloop {}, {}; {}, {}, {how:?}; {}, {threads} threads, {:?}; model {:016x}; {groups} x {worlds} worlds; {:?}",
         env!("CARGO_PKG_VERSION"),

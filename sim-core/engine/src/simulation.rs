@@ -9,6 +9,7 @@ pub use crate::random::Draws;
 
 use crate::backend::sharing::Sharing;
 use crate::backend::{Backend, BackendError, HostPages};
+use crate::canonical::make_canonical;
 use crate::options::{backends, check_memory, memory_of};
 use crate::random::Episode;
 use crate::snapshot::{self, Head, SnapshotError};
@@ -24,6 +25,8 @@ pub struct Simulation {
     precision: Precision,
     layout: Layout,
     freezes_nan: bool,
+    /// Whether frames of the processor are made canonical; a GPU does that itself.
+    makes_canonical: bool,
     backend: Box<dyn Backend>,
     device_note: Option<String>,
 }
@@ -82,12 +85,14 @@ impl Simulation {
         let (made, device_note) = backends(&model, options, groups, &layout)?;
         let with = |mut backend: Box<dyn Backend>| {
             backend.set_faults(options.faults);
+            let is_on_cpu = backend.adapter().is_empty();
             Simulation {
                 model: Arc::clone(&model),
                 worlds: options.worlds,
                 precision: options.precision,
                 layout: layout.clone(),
                 freezes_nan: options.faults.freezes_nan,
+                makes_canonical: options.cpu_bits && is_on_cpu,
                 backend,
                 device_note: device_note.clone(),
             }
@@ -330,7 +335,14 @@ impl Simulation {
     /// # Panics
     /// If the arena (8-byte words) is smaller than the layout.
     pub fn step(&mut self, arena: &mut [u64]) {
-        self.backend.run(self.model.substeps(), arena);
+        self.run(self.model.substeps(), arena);
+    }
+
+    fn run(&mut self, substeps: usize, arena: &mut [u64]) {
+        self.backend.run(substeps, arena);
+        if self.makes_canonical {
+            make_canonical(&self.layout, arena);
+        }
     }
 
     /// As [`Simulation::step`], on one thread, and adds what that took to a profile; false on a GPU, where nothing is done.
@@ -338,7 +350,11 @@ impl Simulation {
     /// # Panics
     /// As [`Simulation::step`].
     pub fn step_profiled(&mut self, arena: &mut [u64], to: &mut Profile) -> bool {
-        self.backend.run_profiled(self.model.substeps(), arena, to)
+        let done = self.backend.run_profiled(self.model.substeps(), arena, to);
+        if self.makes_canonical {
+            make_canonical(&self.layout, arena);
+        }
+        done
     }
 
     /// Evaluates every field at the present state into the arena, without stepping.
@@ -346,6 +362,6 @@ impl Simulation {
     /// # Panics
     /// If the arena (8-byte words) is smaller than the layout.
     pub fn forward(&mut self, arena: &mut [u64]) {
-        self.backend.run(0, arena);
+        self.run(0, arena);
     }
 }

@@ -157,6 +157,10 @@ pub(crate) struct Serve {
     #[arg(long, default_value = "f32")]
     pub(crate) precision: String,
 
+    /// On a GPU, compute the bits that the CPU computes. One thread then has a world, which takes longer where there are contacts.
+    #[arg(long)]
+    pub(crate) cpu_bits: bool,
+
     /// Fields in each frame, separated by commas; time, step, status and contacts_left_out are always there.
     #[arg(long, value_delimiter = ',', default_value = "joint_q,joint_qd,body_q")]
     pub(crate) fields: Vec<String>,

@@ -135,6 +135,7 @@ pub(crate) fn description(
         adapter: String::new(),
         delivery: "direct".to_owned(),
         precision: precision_name(options.precision).to_owned(),
+        cpu_bits: options.cpu_bits && options.precision == Precision::F32,
         threads: info.threads,
         dt: model.dt(),
         substeps: model.substeps(),

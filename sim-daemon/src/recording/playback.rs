@@ -68,6 +68,7 @@ impl Playback {
         };
         let open = |device| Run::open(path, bytes, &head, &fields, device, threads);
         let (run, note) = match head.daemon.adapter.as_str() {
+            _ if head.daemon.cpu_bits => (open(Device::Cpu)?, None),
             "" => (open(Device::Cpu)?, None),
             name => {
                 let device = Device::Gpu {

@@ -279,8 +279,9 @@ impl Compared {
         threads: Option<usize>,
     ) -> Result<Compared, DaemonError> {
         let head = Head::read(path, json)?;
-        // the bits of a GPU are its own
+        // the bits of a GPU are its own, unless they are those of the processor
         let device = match head.daemon.adapter.as_str() {
+            _ if head.daemon.cpu_bits => Device::Cpu,
             "" => Device::Cpu,
             name => Device::Gpu {
                 adapter: Adapter::Name(name.to_owned()),

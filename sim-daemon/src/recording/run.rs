@@ -139,6 +139,7 @@ impl Run {
             compile_limit: compile_limit()?,
             worlds: daemon.worlds,
             first_world: daemon.first_world,
+            cpu_bits: daemon.cpu_bits,
             precision: match daemon.precision.as_str() {
                 "f64" => Precision::F64,
                 _ => Precision::F32,

@@ -414,6 +414,7 @@ fn check(serve: &Serve) -> Result<(Options, Vec<String>), DaemonError> {
         compile_limit: options::compile_limit()?,
         worlds,
         precision,
+        cpu_bits: serve.cpu_bits,
         threads,
         lanes: Lanes::Auto,
         fields: asked.fields,

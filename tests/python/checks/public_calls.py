@@ -182,6 +182,7 @@ CALLS: dict[str, Call] = {
             "groups": "count",
             "device": "choice",
             "precision": "choice",
+            "cpu_bits": "flag",
             "threads": "count",
             "fields": "fields",
             "params": "fields",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -115,12 +116,12 @@ def test_a_call_that_was_killed_in_a_stage_goes_on_from_there_and_the_results_ar
             assert time.monotonic() < until
             time.sleep(0.02)
     before = keys(results)
-    assert before == ["1/torque_free", "1/tiny", "2/torque_free-64"]
+    assert before == ["1/torque_free", "1/tiny", "1/bits-torque_free", "2/torque_free-64"]
     assert [row["worlds"] for row in rows(results / "speed.csv")] == ["64"]
 
     done = run(card, results, CARD_COPY=str(copy))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert keys(results)[:3] == before and len(set(keys(results))) == len(keys(results))
+    assert keys(results)[:4] == before and len(set(keys(results))) == len(keys(results))
     head = [line for line in (results / "speed.csv").read_text().splitlines() if line.startswith("# ")]
     for fact in ("adapter", "driver", "commit", "date", "clocks before"):
         assert any(line.startswith(f"# {fact}: ") for line in head), fact
@@ -131,7 +132,7 @@ def test_a_call_that_was_killed_in_a_stage_goes_on_from_there_and_the_results_ar
     splits = rows(results / "splits.csv")
     assert [(row["world_threads"], row["kernel_size"]) for row in splits] == [
         ("auto", "auto"),
-        ("4", "auto"),
+        ("1 (cpu bits)", "auto"),
         ("auto", "3000"),
     ]
     assert int(splits[2]["kernels"]) > int(splits[0]["kernels"])
@@ -141,6 +142,7 @@ def test_a_call_that_was_killed_in_a_stage_goes_on_from_there_and_the_results_ar
     for scene in ("torque_free", "tiny"):
         assert f"{scene}: same bits among 1, 7, 16 and 64 worlds" in log
     assert "tiny: after 5 frames within " in log
+    assert re.search(r"torque_free: after 5 frames all \d+ numbers are the CPU's", log)
     names = sorted(path.name for path in results.iterdir())
     assert names == sorted(path.name for path in copy.iterdir())
     stages = ("speed.csv", "splits.csv", "tensors.csv", "profile.txt", "published.csv")

@@ -26,6 +26,9 @@ def arguments_of(
     for bound, value in own.pop("bounds", {}).items():
         arguments += [f"--{bound.replace('_', '-')}-max", f"{value}"]
     for name, value in own.items():
+        if isinstance(value, bool):
+            arguments += [f"--{name.replace('_', '-')}"] if value else []
+            continue
         text = value if isinstance(value, str) else ",".join(value) if isinstance(value, Sequence) else f"{value}"
         arguments += [f"--{name.replace('_', '-')}", text]
     return scene_of(made).to_toml(), [*arguments, *extra]

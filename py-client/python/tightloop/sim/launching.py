@@ -35,6 +35,7 @@ def launch(
     groups: None = None,
     device: str = "auto",
     precision: str = "f32",
+    cpu_bits: bool = False,
     threads: int | None = None,
     fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
     params: Sequence[str] = (),
@@ -59,6 +60,7 @@ def launch(
     groups: int,
     device: str = "auto",
     precision: str = "f32",
+    cpu_bits: bool = False,
     threads: int | None = None,
     fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
     params: Sequence[str] = (),
@@ -83,6 +85,7 @@ def launch(
     groups: int | None = None,
     device: str = "auto",
     precision: str = "f32",
+    cpu_bits: bool = False,
     threads: int | None = None,
     fields: Sequence[str] = ("joint_q", "joint_qd", "body_q"),
     params: Sequence[str] = (),
@@ -110,6 +113,10 @@ def launch(
             the first launch of 128 or more worlds in single precision, and uses the faster one. It uses the CPU for
             others. `Sim.device` names the choice, and ``Sim.info["notes"]`` the rates.
         precision: ``"f32"``, or ``"f64"`` for the same physics in double precision.
+        cpu_bits: Let a GPU compute the bits of the CPU, so that a run repeats on the other one, and its recordings
+            replay on any machine. A world then has one thread of the GPU, which takes longer where there are contacts.
+            A driver whose rounding cannot be corrected is refused. In frames of both, zeros have no sign, and numbers
+            below 1.2e-38 are 0.
         threads: Largest number of threads of a step, shared by all groups; all cores if left out.
         fields: Frame fields besides ``time``, ``step``, ``status`` and ``contacts_left_out``: names of `Frame`
             attributes, and of images of cameras, such as ``"wrist_depth"`` (`Scene.add_camera`).
@@ -183,6 +190,8 @@ def launch(
     arguments["draws"] = checks.text("launch: draws", draws, error=ArgumentError)
     arguments["outputs-at"] = checks.text("launch: outputs_at", outputs_at, error=ArgumentError)
     arguments |= _bounds(bounds) | realtime_arguments(realtime)
+    if checks.flag("launch: cpu_bits", cpu_bits, error=ArgumentError):
+        arguments["cpu-bits"] = True
     if threads is not None:
         arguments["threads"] = checks.integer("launch: threads", threads, error=ArgumentError)
     if log is not None:

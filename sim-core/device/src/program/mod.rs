@@ -117,16 +117,17 @@ pub(crate) fn build(
 
 /// The SPIR-V of a program: from the cache if it holds it, otherwise translated.
 pub(crate) fn read(device: &Inner, source: &Source) -> Result<Module, String> {
-    let shuffles = device.info.shuffles;
+    let (shuffles, doubles) = (device.info.shuffles, device.info.doubles);
+    let capabilities = module::capabilities(shuffles, doubles);
     // another device may have kept what this one must refuse
-    let is_kept = shuffles || !source.names_subgroups();
+    let is_kept = (shuffles || !source.names_subgroups()) && (doubles || !source.names_doubles());
     let Some(cache) = device.cache.as_ref().filter(|_| is_kept) else {
-        return module::read(source, device.vulkan.is_some(), shuffles);
+        return module::read(source, device.vulkan.is_some(), capabilities);
     };
     if let Some(module) = cache.module(source) {
         return Ok(module);
     }
-    let module = module::read(source, true, shuffles)?;
+    let module = module::read(source, true, capabilities)?;
     cache.keep_module(source, &module);
     Ok(module)
 }

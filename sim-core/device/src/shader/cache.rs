@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::SystemTime;
 
 /// Head of every file. Increase the number when the file layout or the translation changes.
-const MAGIC: &[u8; 8] = b"tldev 04";
+const MAGIC: &[u8; 8] = b"tldev 05";
 
 /// Most bytes of programs, and of drivers: a hundred large models have less.
 pub(crate) const BYTES_MAX: u64 = 256 << 20;

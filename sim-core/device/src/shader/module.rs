@@ -25,16 +25,25 @@ pub(crate) struct Module {
     pub spirv: Vec<u32>,
 }
 
+/// What a program may have where the device has subgroup operations, and floats of 64 bits.
+pub(crate) fn capabilities(shuffles: bool, doubles: bool) -> Capabilities {
+    let mut capabilities = Capabilities::empty();
+    let subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
+    capabilities.set(subgroups, shuffles);
+    capabilities.set(Capabilities::FLOAT64, doubles);
+    capabilities
+}
+
 /// Reads a program, with its overrides resolved.
 ///
-/// `spirv` requests SPIR-V for Vulkan; the other drivers get the WGSL through wgpu. `shuffles`: the device has subgroup operations.
-pub(crate) fn read(source: &Source, spirv: bool, shuffles: bool) -> Result<Module, String> {
+/// `spirv` requests SPIR-V for Vulkan; the other drivers get the WGSL through wgpu.
+pub(crate) fn read(
+    source: &Source,
+    spirv: bool,
+    capabilities: Capabilities,
+) -> Result<Module, String> {
     let wgsl = source.plain();
     let module = naga::front::wgsl::parse_str(&wgsl).map_err(|e| e.emit_to_string(&wgsl))?;
-    let capabilities = match shuffles {
-        true => Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER,
-        false => Capabilities::empty(),
-    };
     // what threads do together, the branches around it must let them do: naga cannot know which threads share a world
     let flags = ValidationFlags::all() - ValidationFlags::CONTROL_FLOW_UNIFORMITY;
     let info = Validator::new(flags, capabilities)
@@ -100,7 +109,7 @@ pub(crate) fn read(source: &Source, spirv: bool, shuffles: bool) -> Result<Modul
 /// # Errors
 /// What is wrong with its source.
 pub fn translated(source: &Source, shuffles: bool) -> Result<Vec<u32>, String> {
-    Ok(read(source, true, shuffles)?.spirv)
+    Ok(read(source, true, capabilities(shuffles, false))?.spirv)
 }
 
 /// An error and its causes, in one line.

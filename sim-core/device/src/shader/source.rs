@@ -31,4 +31,9 @@ impl Source {
     pub(crate) fn names_subgroups(&self) -> bool {
         self.wgsl.contains("subgroup")
     }
+
+    /// Whether it may have floats of 64 bits: their type is named so.
+    pub(crate) fn names_doubles(&self) -> bool {
+        self.wgsl.contains("f64")
+    }
 }

@@ -11,8 +11,8 @@
 /// Words before the first instruction.
 const HEAD: usize = 5;
 
-/// Opcodes of the float sum, difference, product and quotient.
-const ARITHMETIC: [u32; 4] = [129, 131, 133, 136];
+/// Opcodes of the float sum, difference, product and quotient, and of a vector times a float.
+const ARITHMETIC: [u32; 5] = [129, 131, 133, 136, 142];
 const EXT_INST_IMPORT: u32 = 11;
 const EXT_INST: u32 = 12;
 const LOOP_MERGE: u32 = 246;

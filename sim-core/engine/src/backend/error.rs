@@ -253,6 +253,12 @@ pub enum BackendError {
         /// Why.
         reason: String,
     },
+    /// A GPU that cannot have the processor's bits.
+    #[error("{reason}; launch without cpu_bits, or with device = cpu")]
+    OtherBits {
+        /// Why.
+        reason: String,
+    },
     /// Memory of the device cannot be given to a client.
     #[error("{reason}")]
     Share {

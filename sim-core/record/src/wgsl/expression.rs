@@ -3,6 +3,7 @@
 use crate::ir::recording::Recording;
 use crate::ir::tree::{Binary, Cell, Entry, Op, Operand, Quad, Row, Unary};
 use crate::passes::vectorize::WIDTH;
+use crate::wgsl::corrections::Corrections;
 use std::collections::HashMap;
 
 /// Names of a vector's components.
@@ -13,6 +14,7 @@ pub(super) struct Expressions<'a> {
     pub recording: &'a Recording,
     /// Vectors of which a single component is used, and which: only that is read.
     pub single: HashMap<u32, usize>,
+    pub corrections: Corrections,
 }
 
 impl Expressions<'_> {
@@ -33,7 +35,7 @@ impl Expressions<'_> {
             Op::Unary(unary, a) => match unary {
                 Unary::Neg => format!("(-{})", x(a)),
                 Unary::Not => format!("(!{})", x(a)),
-                Unary::Sqrt => format!("sqrt({})", x(a)),
+                Unary::Sqrt => format!("{}({})", self.corrections.root(), x(a)),
                 Unary::Abs => format!("abs({})", x(a)),
                 Unary::Round => format!("round({})", x(a)),
             },
@@ -43,7 +45,7 @@ impl Expressions<'_> {
                     Binary::Add => format!("{a} + {b}"),
                     Binary::Sub => format!("{a} - {b}"),
                     Binary::Mul => format!("{a} * {b}"),
-                    Binary::Div => format!("{a} / {b}"),
+                    Binary::Div => self.corrections.quotient(&a, &b),
                     Binary::Min => format!("min({a}, {b})"),
                     Binary::Max => format!("max({a}, {b})"),
                     Binary::Lt => format!("{a} < {b}"),
@@ -51,7 +53,10 @@ impl Expressions<'_> {
                     Binary::Or => format!("{a} || {b}"),
                 }
             }
-            Op::Fma(a, b, c) => format!("fma({}, {}, {})", x(a), x(b), x(c)),
+            Op::Fma(a, b, c) => {
+                let fma = self.corrections.fma();
+                format!("{fma}({}, {}, {})", x(a), x(b), x(c))
+            }
             // WGSL names the value of the false case first
             Op::Select(mask, a, b) => format!("select({}, {}, {})", x(b), x(a), x(mask)),
             Op::Number(row) => format!("f32({})", index(row)),

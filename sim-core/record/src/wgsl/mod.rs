@@ -30,6 +30,7 @@ macro_rules! line {
     }};
 }
 
+mod corrections;
 mod expression;
 mod fields;
 
@@ -39,6 +40,8 @@ use crate::passes::vectorize::WIDTH;
 use expression::{COMPONENTS, Expressions, index, scratch, vector};
 use fields::{Fields, place_of_field};
 use std::fmt::{self, Write};
+
+pub use corrections::Corrections;
 
 /// How the lanes of a world exchange values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,6 +71,8 @@ pub struct ProgramOptions {
     pub is_listed: bool,
     /// How lanes exchange values, if a world has several.
     pub exchange: Exchange,
+    /// What is printed as a function, because the driver need not round it to the nearest number.
+    pub corrections: Corrections,
 }
 
 impl ProgramOptions {
@@ -105,6 +110,7 @@ impl Default for ProgramOptions {
             unless: Vec::new(),
             is_listed: false,
             exchange: Exchange::default(),
+            corrections: Corrections::default(),
         }
     }
 }
@@ -145,6 +151,7 @@ pub fn sequence(parts: &[(&Recording, &ProgramOptions)]) -> String {
             expressions: Expressions {
                 recording: &body.recording,
                 single: body.recording.single_parts(),
+                corrections: options.corrections,
             },
             text,
             indent: 1,
@@ -246,7 +253,8 @@ impl Printer<'_> {
         if is_world {
             writeln!(self.text, "var<workgroup> exchange: array<f32, {lanes}>;")?;
         }
-        writeln!(self.text, "\n@compute @workgroup_size({threads})")?;
+        writeln!(self.text, "{}", options.corrections.functions())?;
+        writeln!(self.text, "@compute @workgroup_size({threads})")?;
         let shuffles = lanes > 1 && self.exchange == Exchange::Subgroup;
         let more = match shuffles {
             true => ", @builtin(subgroup_invocation_id) place: u32",

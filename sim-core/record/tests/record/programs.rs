@@ -2,7 +2,7 @@
 
 use crate::{TABLE, accepted, c, toy};
 use sim_physics::lane::{Cx, Num};
-use sim_record::wgsl::{ProgramOptions, wgsl};
+use sim_record::wgsl::{Corrections, ProgramOptions, wgsl};
 use sim_record::{Recorded, record};
 
 #[test]
@@ -90,6 +90,35 @@ fn fields_and_names_of_a_program_are_the_callers() {
     ] {
         assert!(program.contains(line), "{line} is not in\n{program}");
     }
+}
+
+#[test]
+fn corrected_operations_are_functions() {
+    let recording = accepted(|_, x| vec![x[0].fma(x[1], x[0]).div(x[1]), (x[0] * x[1]).sqrt()]);
+    let corrections = Corrections {
+        fma: true,
+        quotient: true,
+        root: true,
+    };
+    let options = ProgramOptions {
+        corrections,
+        ..ProgramOptions::default()
+    };
+    let program = wgsl(&recording, &options);
+    toy::validated(&program);
+    let [_, body] = program.split("@compute").collect::<Vec<_>>()[..] else {
+        panic!("{program}");
+    };
+    for function in ["fused(x0, x1, x0)", "quotient(t", "root(t"] {
+        assert!(body.contains(function), "{function} is not in\n{body}");
+    }
+    // the functions do not call the driver's fma either
+    assert!(
+        !program.contains("fma(") && !body.contains("sqrt("),
+        "{program}"
+    );
+    let plain = wgsl(&recording, &ProgramOptions::default());
+    assert!(plain.contains("fma(x0, x1, x0)") && !plain.contains("fn fused"));
 }
 
 #[test]

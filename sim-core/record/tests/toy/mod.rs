@@ -87,7 +87,7 @@ pub fn validated(wgsl: &str) -> naga::Module {
     let flags = ValidationFlags::all() - ValidationFlags::CONTROL_FLOW_UNIFORMITY;
     Validator::new(
         flags,
-        Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER,
+        Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER | Capabilities::FLOAT64,
     )
     .validate(&module)
     .unwrap_or_else(|e| panic!("{}\n{wgsl}", e.emit_to_string(wgsl)));

@@ -36,6 +36,9 @@ pub struct Description {
     pub delivery: String,
     /// Precision of the run and of every real array of it: "f32" or "f64".
     pub precision: String,
+    /// Whether frames have the same bits on the processor and on GPUs.
+    #[serde(default)]
+    pub cpu_bits: bool,
     /// Threads that a step uses; those of all groups are the same.
     pub threads: usize,
     /// Physics step [s].

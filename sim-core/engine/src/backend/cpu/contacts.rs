@@ -8,6 +8,18 @@ use sim_physics::constants::Constants;
 use sim_physics::constants::contact::{Class, Memory, row};
 use sim_physics::lane::{Lane, Real};
 
+/// A product, rounded once: that of two floats is exact in double precision.
+#[inline(always)]
+fn times<R: Real>(a: R, b: R) -> R {
+    R::from_f64(a.to_f64() * b.to_f64())
+}
+
+/// A sum, rounded once, or as if so: double precision has more than twice the digits (Figueroa, SIGNUM Newsletter 30, 1995).
+#[inline(always)]
+fn plus<R: Real>(a: R, b: R) -> R {
+    R::from_f64(a.to_f64() + b.to_f64())
+}
+
 /// A contact of one world: its row, and the class that it is of.
 struct Contact<'a, R> {
     class: &'a Class<R>,
@@ -55,13 +67,16 @@ impl<F: Lane> World<'_, F> {
         })
     }
 
-    /// Force on the second body, in world axes [N].
+    /// Force on the second body, in world axes [N]; a GPU rounds as often (`backend/gpu/kernels/show.rs`).
     #[inline(always)]
-    fn force(&self, row: usize) -> [f64; 3] {
-        let along = self.three(row, row::FORCE).map(Real::to_f64);
+    fn force(&self, row: usize) -> [F::Real; 3] {
+        let along = self.three(row, row::FORCE);
         let first = [row::NORMAL, row::TANGENTS, row::TANGENTS + 3];
-        let axes = first.map(|k| self.three(row, k).map(Real::to_f64));
-        [0, 1, 2].map(|i| (0..3).map(|a| along[a] * axes[a][i]).sum())
+        let axes = first.map(|k| self.three(row, k));
+        [0, 1, 2].map(|i| {
+            let [x, y, z] = [0, 1, 2].map(|a| times(along[a], axes[a][i]));
+            plus(plus(x, y), z)
+        })
     }
 }
 
@@ -142,13 +157,12 @@ fn put_real<F: Lane>(
         match field {
             Field::ContactDistance => to[0] = world.number(row, row::DISTANCE),
             Field::ContactNormal => to.copy_from_slice(&world.three(row, row::NORMAL)),
-            Field::ContactForce => to.copy_from_slice(&world.force(row).map(Real::from_f64)),
+            Field::ContactForce => to.copy_from_slice(&world.force(row)),
             _ => {
                 let origin = &chunk.block.work.reference[contact.class.trees.1];
                 let point = world.three(row, row::POINT);
                 for i in 0..3 {
-                    let x = origin[i].lane(world.lane).to_f64() + point[i].to_f64();
-                    to[i] = Real::from_f64(x);
+                    to[i] = plus(origin[i].lane(world.lane), point[i]);
                 }
             }
         }
@@ -168,11 +182,12 @@ fn add_sensed<'c, F: Lane>(
         let [a, b] = m.contacts.pairs[world.pair(contact.row)].shapes;
         for (sensor, to) in sensors.iter().zip(to.chunks_exact_mut(3)) {
             for (on, from, sign) in [(b, a, 1.0), (a, b, -1.0)] {
+                let sign = Real::from_f64(sign);
                 if sensor.of[on] && sensor.against[from] {
                     // of few contacts, and so not before
                     let force = world.force(contact.row);
                     for i in 0..3 {
-                        to[i] = Real::from_f64(to[i].to_f64() + sign * force[i]);
+                        to[i] = plus(to[i], times(sign, force[i]));
                     }
                 }
             }
@@ -191,11 +206,11 @@ fn add_forces<'c, F: Lane>(
     for contact in contacts {
         let force = world.force(contact.row);
         let pair = &m.contacts.pairs[world.pair(contact.row)];
-        for (link, sign) in pair.links.into_iter().zip([-1.0, 1.0]) {
+        for (link, sign) in pair.links.into_iter().zip([-1.0, 1.0].map(Real::from_f64)) {
             let Some(link) = link else { continue };
             for i in 0..3 {
                 let cell = &mut to[3 * link + i];
-                *cell = Real::from_f64(cell.to_f64() + sign * force[i]);
+                *cell = plus(*cell, times(sign, force[i]));
             }
         }
     }

@@ -13,6 +13,7 @@ use super::kernels::show;
 use super::kernels::workgroups;
 use super::mirror::HostMirror;
 use super::recipe::{Extent, OutputSources, Recipe};
+use super::rounding;
 use super::sizing::{self, check_frame, check_memory};
 use super::software;
 use super::tile::TileInputs;
@@ -77,12 +78,19 @@ fn limits(info: &AdapterInfo, threads: usize, cuts: Cuts) -> Limits {
     cuts.replace(usual)
 }
 
-/// The constants of a model, as kernels with so many threads per world have them.
-pub(super) fn constants(model: &Model, threads: usize, layout: &Layout) -> Constants<f32> {
+/// The constants of a model, as kernels with so many threads per world have them. `cpu_bits`: classes of contacts are the CPU's, so that
+/// sums have its order.
+pub(super) fn constants(
+    model: &Model,
+    threads: usize,
+    layout: &Layout,
+    cpu_bits: bool,
+) -> Constants<f32> {
     let fields = layout.slots.iter().map(|slot| slot.field);
     let shown = evaluation_stages(model.constants(), fields);
     let solves = |stage: &StageId| stage.writes().contains(&Array::JointQdd);
     let m = match threads {
+        _ if cpu_bits => Cow::Borrowed(model.constants()),
         1 if !is_large(model.constants()) => Cow::Borrowed(model.constants()),
         1 => merged(model.constants()),
         _ => with_blocks(merged(model.constants())),
@@ -117,6 +125,8 @@ pub struct Wanted<'a> {
     pub replay: Replay,
     /// Threads that share a world; none = what suits the adapter.
     pub world_threads: Option<usize>,
+    /// Whether worlds have the CPU's bits.
+    pub cpu_bits: bool,
     /// Where kernels are cut.
     pub cuts: Cuts,
     /// Limit on the compile time of a program.
@@ -174,11 +184,28 @@ impl Gpu {
         } = part;
         let device = Device::open(asked.adapter, asked.cache)?;
         check_frame(&device, layout.bytes as u64)?;
-        let asked_threads = asked.world_threads;
-        let threads =
-            asked_threads.unwrap_or_else(|| workgroups::of_world(device.info(), model.constants()));
-        let constants = constants(model, threads, layout);
+        let usual = || workgroups::of_world(device.info(), model.constants());
+        let threads = match (asked.world_threads, asked.cpu_bits) {
+            (None | Some(1), true) => 1,
+            (Some(threads), true) => {
+                let reason = format!(
+                    "world_threads is {threads}, and so many add in another order than the processor: leave it out, or give 1"
+                );
+                return Err(BackendError::OtherBits { reason });
+            }
+            (threads, false) => threads.unwrap_or_else(usual),
+        };
+        let probe = || rounding::corrections(&device, asked.replay, asked.compile_limit);
+        let corrections = asked.cpu_bits.then(probe).transpose()?;
+        let constants = constants(model, threads, layout, asked.cpu_bits);
         let m = &constants;
+        if asked.cpu_bits && m.contacts.are_stiff && m.contacts.rolled.is_some() {
+            let reason = format!(
+                "contacts can join many of the {} dofs and are stiff, which kernels solve otherwise than the processor",
+                m.dofs.len()
+            );
+            return Err(BackendError::OtherBits { reason });
+        }
         let info = device.info();
         if info.kind == AdapterKind::Software {
             check_software(m)?;
@@ -187,6 +214,7 @@ impl Gpu {
             limits: limits(info, threads, asked.cuts),
             lanes: threads,
             exchange: workgroups::exchange(info, threads),
+            corrections,
         };
         let (programs, places, shown) = programs(m, layout, model.substeps(), how)?;
         let sensors = model.contact_sensors();
@@ -194,8 +222,8 @@ impl Gpu {
         let frame_s = model.substeps() as f64 * model.dt();
         let finds_contacts = finds_contacts(&shown);
         let outputs = OutputSources {
-            show: show::show(&places, layout, frame_s, finds_contacts),
-            contacts: show::contacts(m, &places, layout, shapes),
+            show: show::show(&places, layout, frame_s, finds_contacts, asked.cpu_bits),
+            contacts: show::contacts(m, &places, layout, shapes, asked.cpu_bits),
             finds_contacts,
         };
         let scatters = outputs.contacts.is_some();
@@ -212,6 +240,7 @@ impl Gpu {
             runs: show::runs(m, &places, layout),
             pairs: sizing::pairs(m, sensors),
             threads,
+            canonical: asked.cpu_bits,
             limit: asked.compile_limit,
             replay: asked.replay,
             groups,
@@ -247,7 +276,16 @@ impl Gpu {
             drawn,
             imports: device.info().imports,
             imported: Vec::new(),
-            name: format!("gpu ({}, {})", device.info().name, device.info().driver),
+            name: format!(
+                "gpu ({}, {}{})",
+                device.info().name,
+                device.info().driver,
+                if asked.cpu_bits {
+                    "; bits of the CPU"
+                } else {
+                    ""
+                }
+            ),
             device,
             record: places.record(shape),
             start: start(model),

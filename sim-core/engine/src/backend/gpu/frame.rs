@@ -8,6 +8,7 @@ use super::words;
 use crate::backend::clocks;
 use crate::backend::noise::sample;
 use crate::backend::{BackendError, FirstFrozen};
+use crate::canonical::make_floats_canonical;
 use crate::random::{Draw, Stream};
 use sim_physics::arrays::{Array, Dtype, Field, status};
 
@@ -66,6 +67,9 @@ impl Gpu {
                 let draw = self.draw_of(world, noise.1);
                 let deviation = |number: usize| f64::from(self.mirror.params(world)[number]);
                 self.noise.add_to(noise, row, &draw, deviation);
+            }
+            if self.recipe.canonical {
+                make_floats_canonical(words::array(arena, slot.offset, slot.bytes));
             }
         }
     }

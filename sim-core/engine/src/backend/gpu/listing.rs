@@ -52,11 +52,12 @@ pub fn listing(
 ) -> Result<Listing, BackendError> {
     let threads = world_threads
         .unwrap_or_else(|| workgroups::for_model(model.constants(), workgroups::SUBGROUP));
-    let m = &constants(model, threads, layout);
+    let m = &constants(model, threads, layout, false);
     let how = How {
         limits: HARDWARE,
         lanes: threads,
         exchange: Exchange::Subgroup,
+        corrections: None,
     };
     let (programs, places, _) = programs(m, layout, model.substeps(), how)?;
     let mut kernels = listed("step", programs.step)?;

@@ -32,7 +32,9 @@
 //! # The host's part
 //! The host mirrors seeds, episodes, parameters and counters (`mirror`). It draws starts and noise by the functions of the CPU backend
 //! and sends them as rows. So a reset, a write or a snapshot has the CPU's bits, and a snapshot of one backend runs on the other.
-//! Steps agree within rounding, since a driver may fuse a product and a sum.
+//! Steps agree within rounding: threads of a world add in another order, and a driver's `fma`, quotients and roots need not be the nearest
+//! numbers. `cpu_bits` asks for the CPU's bits: one thread per world, classes of contacts as the CPU has them, and what `rounding` finds
+//! the driver to round otherwise as functions of `sim_record::wgsl::Corrections`.
 //!
 //! # A lost device
 //! Its last frame reports every world as not finite, and the daemon refuses all later commands by name. `auto` leaves the worlds to the
@@ -54,6 +56,7 @@ mod lacks;
 mod listing;
 mod mirror;
 mod recipe;
+mod rounding;
 mod shared;
 mod sharing;
 mod sizing;

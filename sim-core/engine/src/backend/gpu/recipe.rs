@@ -22,6 +22,8 @@ pub(super) struct Recipe {
     pub pairs: Vec<[i32; 4]>,
     /// Threads that share a world.
     pub threads: u32,
+    /// Whether frames are as [`crate::canonical`] has them.
+    pub canonical: bool,
     /// Limit on the compile time of a program.
     pub limit: Duration,
     /// Whether the batches of a frame are recorded or encoded.

@@ -11,8 +11,8 @@ use sim_physics::schedule::step_stages;
 use sim_physics::step::StageId;
 use sim_physics::times;
 use sim_record::split::{Kernel, Limits, Part, Split, split};
-use sim_record::wgsl::{Exchange, ProgramOptions};
-use sim_record::{RecordError, Recorded, Recording};
+use sim_record::wgsl::{Corrections, Exchange, ProgramOptions};
+use sim_record::{RecordError, Recorded, Recorder, Recording};
 use stages_recorded::{between, effects, kept, run};
 
 /// How kernels are made.
@@ -22,6 +22,17 @@ pub(in crate::backend::gpu) struct How {
     /// Threads that share a world where contacts can be.
     pub lanes: usize,
     pub exchange: Exchange,
+    /// What the driver rounds otherwise than the CPU, where worlds have the CPU's bits.
+    pub corrections: Option<Corrections>,
+}
+
+impl How {
+    /// Sets options of a recording, before physics code runs.
+    fn prepare(self, cx: &mut Recorder) {
+        if self.corrections.is_some() {
+            cx.update_factors();
+        }
+    }
 }
 
 /// A kernel of physics.
@@ -75,10 +86,10 @@ impl Programs {
             false => (1, substeps),
         };
         let (recording, options) =
-            step(m, places, &step_stages(m), inside, lanes).map_err(refused)?;
+            step(m, places, &step_stages(m), inside, lanes, how).map_err(refused)?;
         let (step, step_spare) = partition(&recording, &options, how, places.len, outside)?;
         let (recording, options) =
-            evaluation(m, places, shown, computed, wanted).map_err(refused)?;
+            evaluation(m, places, shown, computed, wanted, how).map_err(refused)?;
         let (evaluate, evaluate_spare) = partition(&recording, &options, how, places.len, 1)?;
         Ok(Programs {
             step,
@@ -104,6 +115,7 @@ fn partition(
 ) -> Result<(KernelSequence, u32), BackendError> {
     let options = ProgramOptions {
         exchange: how.exchange,
+        corrections: how.corrections.unwrap_or_default(),
         ..options.clone()
     };
     let split = split(recording, &options, how.limits, spare);
@@ -190,6 +202,7 @@ fn step(
     stages: &[StageId],
     substeps: usize,
     lanes: usize,
+    how: How,
 ) -> Result<(Recording, ProgramOptions), RecordError> {
     let (mut reads, _) = effects(stages);
     let kept = kept();
@@ -201,6 +214,7 @@ fn step(
     }
     let recording = between(m, &reads, &kept, |cx, b| {
         cx.set_lanes(lanes);
+        how.prepare(cx);
         if substeps == 1 {
             stages.iter().for_each(|stage| run(*stage, cx, m, b));
         } else {
@@ -227,6 +241,7 @@ fn evaluation(
     stages: &[StageId],
     computed: &[(Field, usize)],
     wanted: &[Array],
+    how: How,
 ) -> Result<(Recording, ProgramOptions), RecordError> {
     let (mut reads, written) = effects(stages);
     // fields that are made of the state may read what no stage does
@@ -241,6 +256,7 @@ fn evaluation(
     let is_kept = |array: &Array| wanted.contains(array) || *array == Array::LeftOut;
     let writes: Vec<Array> = written.into_iter().filter(is_kept).collect();
     let recording = between(m, &reads, &writes, |cx, b| {
+        how.prepare(cx);
         stages.iter().for_each(|stage| run(*stage, cx, m, b));
         let mut rows = Vec::new();
         for &(field, numbers) in computed {

@@ -127,12 +127,14 @@ impl ShowTable {
 
 /// Copies runs of numbers into the frame, and writes the counters. A workgroup has a part of one run, so neighbouring threads write
 /// neighbouring words; the last workgroups have a world per thread. `time` is `step` times the duration of a frame, rounded as a
-/// processor rounds it. `counts`: the evaluation has found contacts, so those that did not fit are counted first.
+/// processor rounds it. `counts`: the evaluation has found contacts, so those that did not fit are counted first. `canonical`: numbers
+/// are as [`crate::canonical`] has them.
 pub(in crate::backend::gpu) fn show(
     places: &Places,
     layout: &Layout,
     frame_s: f64,
     counts: bool,
+    canonical: bool,
 ) -> String {
     let word = |field: Field| {
         let array = layout.slots.iter().find(|array| array.field == field);
@@ -146,7 +148,8 @@ pub(in crate::backend::gpu) fn show(
     let bits = frame_s.to_bits();
     let mantissa = (bits & ((1 << 52) - 1)) | (1 << 52);
     let exponent = (bits >> 52) as i64 - 1075;
-    SHOW.replace("ACCESS", if counts { "read_write" } else { "read" })
+    SHOW.replace("SHOWN", shown(canonical))
+        .replace("ACCESS", if counts { "read_write" } else { "read" })
         .replace("COUNT_LEFT_OUT\n", &count)
         .replace("LOW", &format!("{}u", mantissa as u32))
         .replace("HIGH", &format!("{}u", (mantissa >> 32) as u32))
@@ -155,6 +158,14 @@ pub(in crate::backend::gpu) fn show(
         .replace("AT_STEP", &format!("{}u", word(Field::Step)))
         .replace("AT_STATUS", &format!("{}u", word(Field::Status)))
         .replace("AT_LEFT_OUT", &format!("{}u", word(Field::ContactsLeftOut)))
+}
+
+/// What a number is in a frame: a function of its bits.
+fn shown(canonical: bool) -> &'static str {
+    match canonical {
+        true => "fn shown(x: u32) -> u32 { return select(x, 0u, (x & 0x7f800000u) == 0u); }",
+        false => "fn shown(x: u32) -> u32 { return x; }",
+    }
 }
 
 const SHOW: &str = "
@@ -166,6 +177,7 @@ override workgroup: u32 = 64u;
 @group(0) @binding(2) var<storage, read_write> frame: array<u32>;
 @group(0) @binding(3) var<storage, ACCESS> counters: array<vec4<u32>>;
 fn number(i: u32, w: u32) -> u32 { return fields[((i / 4u) * worlds + w) * 4u + i % 4u]; }
+SHOWN
 // a * b + c, low and high word
 fn wide(a: u32, b: u32, c: u32) -> vec2<u32> {
     let al = a & 0xffffu; let ah = a >> 16u; let bl = b & 0xffffu; let bh = b >> 16u;
@@ -239,7 +251,7 @@ fn main(@builtin(workgroup_id) at: vec3<u32>, @builtin(local_invocation_index) t
     let end = min(head.y * run.z, first + workgroup * words);
     for (var n = first; n < end; n += workgroup) {
         let w = n / run.z;
-        frame[run.y + n] = number(run.x + n - w * run.z, w);
+        frame[run.y + n] = shown(number(run.x + n - w * run.z, w));
     }
 }
 ";
@@ -250,6 +262,7 @@ pub(in crate::backend::gpu) fn contacts(
     places: &Places,
     layout: &Layout,
     shapes: usize,
+    canonical: bool,
 ) -> Option<String> {
     let arrays: Vec<&Slot> = (layout.slots.iter())
         .filter(|array| is_of_contacts(array.field) && array.bytes > 0)
@@ -272,7 +285,8 @@ override workgroup: u32 = 64u;
 fn kept(i: u32, w: u32) -> f32 {{ return scratch[(i / 4u) * worlds + w][i % 4u]; }}
 fn at(row: u32, k: u32, w: u32) -> f32 {{ return kept({base}u + row * {stride}u + k, w); }}
 fn three(row: u32, k: u32, w: u32) -> vec3<f32> {{ return vec3<f32>(at(row, k, w), at(row, k + 1u, w), at(row, k + 2u, w)); }}
-fn put(i: u32, x: f32) {{ frame[i] = bitcast<u32>(x); }}
+{shown}
+fn put(i: u32, x: f32) {{ frame[i] = shown(bitcast<u32>(x)); }}
 fn put3(i: u32, x: vec3<f32>) {{ put(i, x.x); put(i + 1u, x.y); put(i + 2u, x.z); }}
 fn add3(i: u32, x: vec3<f32>) {{
     put3(i, x + vec3<f32>(bitcast<f32>(frame[i]), bitcast<f32>(frame[i + 1u]), bitcast<f32>(frame[i + 2u])));
@@ -284,6 +298,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
     let world = what[0].x + w;
     var n = 0u;
 ",
+        shown = shown(canonical),
         base = rows.base,
         stride = rows.stride,
     );
