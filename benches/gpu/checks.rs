@@ -32,8 +32,7 @@ pub fn check(place: &Place, arguments: &Arguments) -> anyhow::Result<()> {
         match scene {
             Scene::Target => follows_target(place, &plan)?,
             Scene::Grasp => follows_grasp(place, &plan)?,
-            _ if place.cpu_bits => {}
-            Scene::File(_) => agreement::follows_cpu(place, &plan)?,
+            Scene::File(_) if !place.cpu_bits => agreement::follows_cpu(place, &plan)?,
             _ => {}
         }
         has_same_bits(place, &plan, &arguments.check_worlds)?;

@@ -133,6 +133,12 @@ impl Run {
         self.sim.forward(&mut self.arena);
     }
 
+    /// Fields of numbers of a world, one after another.
+    pub fn numbers(&self, fields: &[Field], world: usize) -> Vec<f64> {
+        let numbers = fields.iter().flat_map(|field| self.get(*field, world));
+        numbers.collect()
+    }
+
     /// A field of numbers of a world.
     pub fn get(&self, field: Field, world: usize) -> Vec<f64> {
         let slot = self

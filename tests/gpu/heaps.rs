@@ -1,9 +1,9 @@
 //! Heaps of bodies, whose contacts can join all dofs to one system: loops solve it, and one class has the contacts of all bodies.
 
 use crate::common::{Run, noise};
-use crate::{assert_alive, gpu, options};
+use crate::{assert_alive, gpu, options, thrown};
+use sim_engine::backend::BackendError;
 use sim_engine::backend::gpu::listing;
-use sim_engine::backend::{BackendError, Values};
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_model::{Body, Collision, Description, Model, Pose, Shape};
 use sim_physics::arrays::Field;
@@ -49,7 +49,6 @@ fn played(model: &Arc<Model>, device: Device, threads: usize, ids: &[usize], fra
         cpu_bits: threads == 1,
         ..options(device, ids.len(), &FIELDS)
     };
-    let mut run = Run::new(model, options);
     let dofs = model.dofs();
     // of a free body, at most 0.3 m/s and SPIN
     let speed = |id: &usize| {
@@ -57,22 +56,11 @@ fn played(model: &Arc<Model>, device: Device, threads: usize, ids: &[usize], fra
         (0..dofs).map(of_dof).collect::<Vec<f64>>()
     };
     let speeds: Vec<f64> = ids.iter().flat_map(speed).collect();
-    let values = Values::F64(&speeds);
-    run.sim
-        .write(Field::JointQd, 0..dofs, values, None)
-        .unwrap();
-    for _ in 0..frames {
-        run.step();
-    }
-    assert_alive(&run);
-    run
+    thrown(model, options, &speeds, frames)
 }
 
 fn state(run: &Run, world: usize) -> Vec<f64> {
-    FIELDS
-        .iter()
-        .flat_map(|field| run.get(*field, world))
-        .collect()
+    run.numbers(&FIELDS, world)
 }
 
 #[test]

@@ -4,8 +4,7 @@
 //! workgroup, and its threads exchange values through memory.
 
 use crate::common::{Run, noise};
-use crate::{assert_alive, gpu, options};
-use sim_engine::backend::Values;
+use crate::{gpu, options, thrown};
 use sim_engine::options::Cuts;
 use sim_engine::simulation::{Device, Options};
 use sim_model::{Body, Collision, Description, Model, Pose, Robot, Shape, UrdfOptions};
@@ -61,23 +60,13 @@ fn played_with(
         cuts,
         ..options(device, ids.len(), &FIELDS)
     };
-    let mut run = Run::new(&model, options);
     let speed = |id: &usize| (0..2).map(|k| 3.0 * noise(*id, k)).collect::<Vec<_>>();
     let speeds: Vec<f64> = ids.iter().flat_map(speed).collect();
-    let values = Values::F64(&speeds);
-    run.sim.write(Field::JointQd, 0..2, values, None).unwrap();
-    for _ in 0..frames {
-        run.step();
-    }
-    assert_alive(&run);
-    run
+    thrown(&model, options, &speeds, frames)
 }
 
 fn state(run: &Run, world: usize) -> Vec<f64> {
-    FIELDS
-        .iter()
-        .flat_map(|field| run.get(*field, world))
-        .collect()
+    run.numbers(&FIELDS, world)
 }
 
 #[test]

@@ -23,6 +23,7 @@ mod sharing;
 mod stages;
 mod uploads;
 
+use sim_engine::backend::Values;
 use sim_engine::options::Adapter;
 use sim_engine::simulation::{Device, Options};
 use sim_model::Model;
@@ -45,6 +46,21 @@ fn options(device: Device, worlds: usize, fields: &[Field]) -> Options {
         fields: fields.to_vec(),
         ..Options::default()
     }
+}
+
+/// Worlds that start with these speeds, of their first dofs, after some frames.
+fn thrown(model: &Arc<Model>, options: Options, speeds: &[f64], frames: usize) -> common::Run {
+    let columns = speeds.len() / options.worlds;
+    let mut run = common::Run::new(model, options);
+    let values = Values::F64(speeds);
+    run.sim
+        .write(Field::JointQd, 0..columns, values, None)
+        .unwrap();
+    for _ in 0..frames {
+        run.step();
+    }
+    assert_alive(&run);
+    run
 }
 
 fn run(model: &Arc<Model>, device: Device, worlds: usize, fields: &[Field]) -> common::Run {

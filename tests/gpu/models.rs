@@ -1,8 +1,7 @@
 //! Models with contacts in many places, as hardware has them: kernels stay short, and several threads find what the CPU finds.
 
 use crate::common::{Run, noise, repo};
-use crate::{assert_alive, gpu, options};
-use sim_engine::backend::Values;
+use crate::{gpu, options, thrown};
 use sim_engine::backend::gpu::{KernelListing, listing};
 use sim_engine::simulation::{Device, Options, Simulation};
 use sim_model::{Description, Model, MujocoOptions, Robot, UrdfOptions};
@@ -76,20 +75,11 @@ fn played(model: &Arc<Model>, device: Device, threads: Option<usize>, frames: us
         world_threads: threads,
         ..options(device, WORLDS, &FIELDS)
     };
-    let mut run = Run::new(model, options);
     let dofs = model.dofs();
     let speeds: Vec<f64> = (0..WORLDS * dofs)
         .map(|k| noise(k / dofs, k % dofs))
         .collect();
-    let values = Values::F64(&speeds);
-    run.sim
-        .write(Field::JointQd, 0..dofs, values, None)
-        .unwrap();
-    for _ in 0..frames {
-        run.step();
-    }
-    assert_alive(&run);
-    run
+    thrown(model, options, &speeds, frames)
 }
 
 /// Largest difference of numbers x, as a part of 1 + |x|.

@@ -112,8 +112,8 @@ fn fall(
 
 /// Bits of a world's fields.
 fn bits(run: &Run, world: usize) -> Vec<u64> {
-    let numbers = FIELDS.iter().flat_map(|field| run.get(*field, world));
-    numbers.map(f64::to_bits).collect()
+    let numbers = run.numbers(&FIELDS, world);
+    numbers.into_iter().map(f64::to_bits).collect()
 }
 
 /// Heights of worlds that land in different frames, and of one that does not.

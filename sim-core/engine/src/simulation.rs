@@ -340,6 +340,11 @@ impl Simulation {
 
     fn run(&mut self, substeps: usize, arena: &mut [u64]) {
         self.backend.run(substeps, arena);
+        self.finish(arena);
+    }
+
+    /// Leaves a frame as it is shown.
+    fn finish(&self, arena: &mut [u64]) {
         if self.makes_canonical {
             make_canonical(&self.layout, arena);
         }
@@ -351,9 +356,7 @@ impl Simulation {
     /// As [`Simulation::step`].
     pub fn step_profiled(&mut self, arena: &mut [u64], to: &mut Profile) -> bool {
         let done = self.backend.run_profiled(self.model.substeps(), arena, to);
-        if self.makes_canonical {
-            make_canonical(&self.layout, arena);
-        }
+        self.finish(arena);
         done
     }
 

@@ -4,14 +4,13 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use sim_engine::options::{Adapter, cache_folder};
 use sim_engine::simulation::Device;
 use sim_protocol::{Description, Op};
 
 use super::entries::{Entries, Entry};
 use super::failure::unreadable;
 use super::records::Record;
-use super::run::{Head, Run};
+use super::run::{Head, Run, device_of};
 use crate::error::DaemonError;
 use crate::export::Advance;
 use crate::export::arrays::Arrays;
@@ -67,24 +66,17 @@ impl Playback {
             ..fields.clone()
         };
         let open = |device| Run::open(path, bytes, &head, &fields, device, threads);
-        let (run, note) = match head.daemon.adapter.as_str() {
-            _ if head.daemon.cpu_bits => (open(Device::Cpu)?, None),
-            "" => (open(Device::Cpu)?, None),
-            name => {
-                let device = Device::Gpu {
-                    adapter: Adapter::Name(name.to_owned()),
-                    cache: cache_folder(),
-                };
-                match open(device) {
-                    Ok(run) => (run, None),
-                    Err(error) => {
-                        let note = format!(
-                            "played on the CPU, whose bits are others than those of the GPU it was recorded on: {error}"
-                        );
-                        (open(Device::Cpu)?, Some(note))
-                    }
+        let (run, note) = match device_of(&head.daemon) {
+            Device::Cpu => (open(Device::Cpu)?, None),
+            gpu => match open(gpu) {
+                Ok(run) => (run, None),
+                Err(error) => {
+                    let note = format!(
+                        "played on the CPU, whose bits are others than those of the GPU it was recorded on: {error}"
+                    );
+                    (open(Device::Cpu)?, Some(note))
                 }
-            }
+            },
         };
         Ok(Playback {
             entries,

@@ -6,8 +6,6 @@ use std::io::{BufReader, IsTerminal, Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use sim_engine::options::{Adapter, cache_folder};
-use sim_engine::simulation::Device;
 use sim_protocol::digest::{digest, digests_of};
 use sim_protocol::{Row, Table};
 
@@ -15,7 +13,7 @@ use super::compare::{Seen, first_difference};
 use super::entries::{Entries, Entry};
 use super::failure::unreadable;
 use super::records::{Record, RecordedCommand};
-use super::run::{Head, Run};
+use super::run::{Head, Run, device_of};
 use crate::cli;
 use crate::error::DaemonError;
 use crate::export::{self, Advance};
@@ -279,15 +277,7 @@ impl Compared {
         threads: Option<usize>,
     ) -> Result<Compared, DaemonError> {
         let head = Head::read(path, json)?;
-        // the bits of a GPU are its own, unless they are those of the processor
-        let device = match head.daemon.adapter.as_str() {
-            _ if head.daemon.cpu_bits => Device::Cpu,
-            "" => Device::Cpu,
-            name => Device::Gpu {
-                adapter: Adapter::Name(name.to_owned()),
-                cache: cache_folder(),
-            },
-        };
+        let device = device_of(&head.daemon);
         let run = Run::open(path, bytes, &head, &head.fields(path)?, device, threads)?;
         let table = export::frame_table(run.simulation.layout(), run.eyes.images());
         let is_observed = |row: &&Row| head.observed.contains(&row.name);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use sim_engine::options::compile_limit;
+use sim_engine::options::{Adapter, cache_folder, compile_limit};
 use sim_engine::simulation::{
     Device, Draws, Faults, Lanes, Options, OutputsAt, Precision, Simulation,
 };
@@ -24,6 +24,17 @@ const WORLDS_MAX: usize = u32::MAX as usize;
 
 /// Bytes of a world's counters in a state; see `sim-core/engine/src/snapshot.rs`.
 const COUNTERS: u64 = 28;
+
+/// The device that computes a run's bits again: its GPU, whose bits are its own, unless they are those of the processor.
+pub(super) fn device_of(daemon: &Description) -> Device {
+    if daemon.adapter.is_empty() || daemon.cpu_bits {
+        return Device::Cpu;
+    }
+    Device::Gpu {
+        adapter: Adapter::Name(daemon.adapter.clone()),
+        cache: cache_folder(),
+    }
+}
 
 /// The head of a recording.
 #[derive(Debug, Deserialize)]

@@ -266,6 +266,16 @@ def test_an_error_of_recv_leaves_no_step_on_its_way() -> None:
     env.close()
 
 
+def test_flags_of_a_task_have_no_value_on_the_command_line(monkeypatch: Any) -> None:
+    from tightloop.env.__main__ import arguments_of
+
+    for wanted in (True, False):
+        monkeypatch.setattr(CartPoleBalance, "launch_options", {"cpu_bits": wanted})
+        arguments = arguments_of("CartPoleBalance", {}, [])[1]
+        assert ("--cpu-bits" in arguments) == wanted
+        assert f"{wanted}" not in arguments
+
+
 def test_a_single_environment_joins_no_daemon_of_many(unique: Any) -> None:
     from tightloop.env.__main__ import arguments_of
 
